@@ -1,0 +1,153 @@
+"""Ports: what the house asks of its plug-ins. They come by entry point (`lcd_flight.plugins`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Protocol, Self
+
+from lcd_flight.model.rollout import RolloutLabels
+from lcd_flight.model.state import AttitudeThrust
+from lcd_flight.model.telemetry import LinkReport, PoseReport
+from lcd_flight.model.tick import Tick, TickInputs
+from lcd_flight.model.trajectory import Trajectories
+from lcd_flight.model.types import FloatArray, Loop, SeedArray, Vector3
+from lcd_flight.model.vehicle import Vehicle
+
+
+class Clock(Protocol):
+    """Monotonic nanoseconds, real or virtual."""
+
+    def now_ns(self) -> int:
+        """The time now."""
+        ...
+
+    async def sleep_until(self, deadline_ns: int) -> None:
+        """Return at the deadline, or at once where it has passed."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class LinkContext:
+    """What a link is given besides its URI."""
+
+    vehicle: Vehicle
+    clock: Clock
+    initial_position_m: Vector3
+    initial_yaw_rad: float
+    seed: int
+    battery_V: float | None = None
+    """Voltage that a simulated vehicle starts with; None: full."""
+    publish_pose: Callable[[bytes], None] | None = None
+    """Where a simulated vehicle publishes its pose, as mocap frames (`lcd_flight.wire.mocap_frame`)."""
+
+
+class Link(Protocol):
+    """The way to one vehicle. Connecting is `async with`; send never blocks; the freshest setpoint wins.
+
+    A setpoint older than 50 ms is never sent; from 100 ms without a fresh one the link's stated fallback acts.
+    """
+
+    async def __aenter__(self) -> Self:
+        """Connect.
+
+        Raises:
+            RefusedError: no connection, with the reason and the remedy.
+        """
+        ...
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop the motors, close; also after an exception."""
+        ...
+
+    @property
+    def description(self) -> str:
+        """What is at the other end, e.g. `firmware sim-1`."""
+        ...
+
+    async def arm(self) -> None:
+        """Make the vehicle ready to spin its motors.
+
+        Raises:
+            RefusedError: the vehicle will not, with its reason.
+        """
+        ...
+
+    async def disarm(self) -> None:
+        """Take readiness away on the ground."""
+        ...
+
+    def send(self, setpoint: AttitudeThrust, stamp_ns: int) -> None:
+        """Hand over the setpoint of the tick that began at `stamp_ns`."""
+        ...
+
+    def stop_motors(self) -> None:
+        """Emergency stop, at once; later setpoints are ignored."""
+        ...
+
+    def report(self, now_ns: int) -> LinkReport:
+        """What is known now."""
+        ...
+
+
+class PoseSource(Protocol):
+    """Filtered pose of one rigid body."""
+
+    async def __aenter__(self) -> Self:
+        """Start listening.
+
+        Raises:
+            RefusedError: the endpoint is not to be had.
+        """
+        ...
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop listening."""
+        ...
+
+    def report(self, now_ns: int) -> PoseReport:
+        """Drain what has arrived, and the filtered pose brought forward to `now_ns`."""
+        ...
+
+
+class Observer(Protocol):
+    """Who listens to the flight. Bounded and never blocking."""
+
+    def observe(self, inputs: TickInputs, tick: Tick) -> None:
+        """Take note of one tick."""
+        ...
+
+    def close(self) -> None:
+        """The flight is over: keep what is held."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RolloutOptions:
+    """How a batch is flown, beside vehicle and plans."""
+
+    loop: Loop = "paper"
+    controller: str = "geometric"
+    nominal: Vehicle | None = None
+    """What the controller believes it flies; None: the vehicle itself."""
+    start_aligned: bool = True
+    """Whether it starts with the yaw of the first waypoint (else yaw 0)."""
+    pose_gap_ticks: FloatArray | None = None
+    """(N, 2) first tick and length of a gap in the pose, which the controller bridges by coasting; None: no gaps."""
+    threads: int = 0
+    """0: all cores."""
+
+
+class Simulator(Protocol):
+    """Batched closed-loop rollouts: the same function for data, polish, evaluation and rehearsal."""
+
+    def rollout(
+        self, plans: Trajectories, vehicle: Vehicle, seeds: SeedArray, options: RolloutOptions
+    ) -> RolloutLabels:
+        """Fly every plan once: plans (N), seeds (N,). The result depends on each row's inputs alone."""
+        ...

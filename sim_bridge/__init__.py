@@ -1,0 +1,1 @@
+"""Simulated vehicles: the multirotor model, batched rollouts, the simulated link."""

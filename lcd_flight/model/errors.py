@@ -1,4 +1,4 @@
-"""One exception tree, mapped to exit codes at the command line; what can fail in flight is a value, not an exception."""
+"""One exception tree, mapped to exit codes at the command line; what can fail in flight is a value instead."""
 
 from __future__ import annotations
 

@@ -1,0 +1,76 @@
+"""Entry points of `lcd` and `lcd-fly`, and the one place where errors become a line, a JSON object and an exit code."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import traceback
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+import typer
+
+from lcd_flight.cli import bench, evaluation, fly, learning, mission, review
+from lcd_flight.cli.terminal import Terminal
+from lcd_flight.model.errors import LcdError, Outcome
+
+app = typer.Typer(
+    name="lcd",
+    help="Plan quadrotor trajectories that this vehicle can really fly, fly them, and see why they went as they did.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+app.command("fly")(fly.fly)
+app.command("check")(mission.check)
+app.command("plan")(mission.plan)
+app.command("collect")(learning.collect)
+app.command("train")(learning.train)
+app.command("evaluate")(evaluation.evaluate)
+app.command("review")(review.review)
+app.command("bench")(bench.bench)
+
+flyer = typer.Typer(
+    name="lcd-fly", add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None, help=fly.fly.__doc__
+)
+flyer.command()(fly.fly)
+
+
+def lcd(arguments: Sequence[str] | None = None) -> None:
+    """Entry point of `lcd`. Exits the process with the outcome's code."""
+    sys.exit(run(app, sys.argv[1:] if arguments is None else arguments))
+
+
+def lcd_fly(arguments: Sequence[str] | None = None) -> None:
+    """Entry point of `lcd-fly`, the same as `lcd fly`. Exits the process with the outcome's code."""
+    sys.exit(run(flyer, sys.argv[1:] if arguments is None else arguments))
+
+
+def run(application: typer.Typer, arguments: Sequence[str]) -> int:
+    """Run a command line and return its exit code; never raises and never shows a traceback."""
+    terminal = Terminal.from_arguments(arguments)
+    try:
+        code = application(args=list(arguments), standalone_mode=False)
+        return int(code or 0)
+    except click.exceptions.Exit as stop:
+        return stop.exit_code
+    except click.ClickException as error:
+        return terminal.fail(Outcome.INVALID_INPUT, f"{error.format_message()} (--help lists the options)")
+    except LcdError as error:
+        return terminal.fail(error.outcome, str(error))
+    except (KeyboardInterrupt, click.Abort):
+        return terminal.fail(Outcome.INTERRUPTED, "interrupted; run the same command again to go on")
+    except BrokenPipeError:
+        sys.stderr.close()  # the reader has gone: nothing is left to be said
+        return Outcome.INTERRUPTED.exit_code
+    except Exception as error:  # noqa: BLE001 - the last boundary before the user
+        return terminal.fail(Outcome.INTERNAL_ERROR, _unexpected(error))
+
+
+def _unexpected(error: Exception) -> str:
+    """Keep the traceback in a file and say where, with what a report needs."""
+    with tempfile.NamedTemporaryFile("w", prefix="lcd-flight-error-", suffix=".txt", delete=False) as file:
+        file.write(" ".join(sys.argv) + "\n" + "".join(traceback.format_exception(error)))
+    return f"a fault of lcd-flight: {type(error).__name__}: {error}; details for a report in {Path(file.name)}"

@@ -1,0 +1,118 @@
+"""What the user sees: one line a phase, warnings with reasons, progress, and the JSON object at the end.
+
+Lines for people go to standard output, or to standard error with `--json`, so that standard output ends with the object
+and a pipe gets nothing else.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from lcd_flight.model.errors import Outcome
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress
+
+LABEL_WIDTH = 11
+
+
+class Terminal:
+    """Prints for people, or for programs, as the options say.
+
+    json_line: whether the last line of standard output is a JSON object.
+    quiet: whether lines that are neither warnings nor errors are left out.
+    color: False for plain text; a pipe gets plain text anyway.
+    """
+
+    def __init__(self, *, json_line: bool = False, quiet: bool = False, color: bool = True) -> None:
+        self.json_line = json_line
+        self.quiet = quiet
+        self._color = color
+        self._console: Console | None = None
+
+    @classmethod
+    def from_arguments(cls, arguments: Sequence[str]) -> Terminal:
+        """The terminal for errors that come before the options are parsed."""
+        return cls(json_line="--json" in arguments, color="--no-color" not in arguments)
+
+    @property
+    def console(self) -> Console:
+        """rich's console on the stream that people read."""
+        if self._console is None:
+            from rich.console import Console
+
+            self._console = Console(
+                file=sys.stderr if self.json_line else sys.stdout,
+                no_color=not self._color,
+                highlight=False,
+                markup=False,
+                soft_wrap=True,
+            )
+        return self._console
+
+    @property
+    def interactive(self) -> bool:
+        """Whether a person is watching and can see lines change in place."""
+        return self.console.is_terminal and not self.quiet
+
+    def line(self, label: str, text: str, style: str = "") -> None:
+        """One line of the story: `CHECK      mission ok: ...`."""
+        if not self.quiet:
+            self.console.print(f"{label:<{LABEL_WIDTH}}", style=f"bold {style}".strip(), end="")
+            self.console.print(text, style=style or None)
+
+    def detail(self, text: str) -> None:
+        """A line that belongs to the one before."""
+        if not self.quiet:
+            self.console.print(" " * (LABEL_WIDTH + 2) + text)
+
+    def warn(self, text: str) -> None:
+        """A warning; shown even when quiet."""
+        self.console.print(f" WARN {text}", style="yellow")
+
+    def finish(self, outcome: Outcome, result: Mapping[str, Any]) -> int:
+        """Print the JSON object where asked for and return the exit code."""
+        if self.json_line:
+            print(json.dumps({"outcome": outcome.value, "error": None, **_plain(result)}, allow_nan=False))  # noqa: T201
+        return outcome.exit_code
+
+    def fail(self, outcome: Outcome, message: str, result: Mapping[str, Any] | None = None) -> int:
+        """Say what went wrong on standard error, print the JSON object where asked for, return the exit code."""
+        for text in message.splitlines():
+            print(f"error: {text}", file=sys.stderr)  # noqa: T201
+        if self.json_line:
+            print(json.dumps({"outcome": outcome.value, "error": message, **_plain(result or {})}, allow_nan=False))  # noqa: T201
+        return outcome.exit_code
+
+    def progress(self) -> Progress:
+        """A progress display for long work; silent where nobody watches."""
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        return Progress(
+            TextColumn("{task.description:<10}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[note]}"),
+            TimeRemainingColumn(),
+            console=self.console,
+            disable=not self.interactive,
+            transient=True,
+        )
+
+
+def _plain(value: Any) -> Any:
+    """The same value as JSON has it: numpy scalars and arrays as numbers and lists, what is not finite as null."""
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if isinstance(value, bool | int | str | None) else str(value)

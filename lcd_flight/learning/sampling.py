@@ -1,0 +1,68 @@
+"""The paper's waypoint-following tasks, drawn by counter-based streams (`streams.py`).
+
+Task i of seed s is the same whatever the count and the grouping. Seeds 0 to 999 are for development: evaluation that
+is reported as evidence uses others.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lcd_flight.learning.streams import Stream
+from lcd_flight.model import FloatArray, IntArray, Tasks, TaskSampler
+
+_MOST_ATTEMPTS = 10_000
+"""For one waypoint; the paper's sampler accepts about every third candidate."""
+
+
+def sample_tasks(sampler: TaskSampler, seed: int, indices: IntArray) -> Tasks:
+    """The tasks with the given global indices (N,).
+
+    Each waypoint is uniform in the part of the box that lies within the sampler's distances of the previous one
+    (paper, "Data Collection": drawn in the domain, kept when at least 1 m and no more than 3 m from the previous).
+
+    Raises:
+        ValueError: the sampler's box has no room for its distances.
+    """
+    indices = np.asarray(indices, dtype=np.int64)
+    waypoints = np.empty((len(indices), sampler.waypoints, 3))
+    low, high = _box(sampler)
+    waypoints[:, 0] = low + (high - low) * Stream(seed, "task/first").uniforms(indices, 3)
+    for k in range(1, sampler.waypoints):
+        stream = Stream(seed, f"task/waypoint/{k}")
+        waypoints[:, k] = _next_waypoint(sampler, stream, indices, waypoints[:, k - 1])
+    turns = 2.0 * Stream(seed, "task/yaw").uniforms(indices, sampler.waypoints) - 1.0
+    return Tasks(waypoints, sampler.yaw_span_rad * turns)
+
+
+def first_tasks(sampler: TaskSampler, seed: int, count: int) -> Tasks:
+    """Tasks 0 to `count` - 1 of a seed."""
+    return sample_tasks(sampler, seed, np.arange(count))
+
+
+def _box(sampler: TaskSampler) -> tuple[FloatArray, FloatArray]:
+    """Least and greatest corner of the domain, m."""
+    size = np.asarray(sampler.box_m)
+    low = np.array([-0.5 * size[0], -0.5 * size[1], 0.0])
+    return low, low + size
+
+
+def _next_waypoint(sampler: TaskSampler, stream: Stream, indices: IntArray, previous: FloatArray) -> FloatArray:
+    """(N, 3) candidates in a cube around the previous waypoint until each is in the box and in the shell.
+
+    Attempt a uses draws 3a to 3a + 2 of the task's own stream, so that a task's luck does not depend on the others.
+    """
+    nearest, farthest = sampler.distance_m
+    low, high = _box(sampler)
+    result = np.empty_like(previous)
+    pending = np.arange(len(indices))
+    for attempt in range(_MOST_ATTEMPTS):
+        if not len(pending):
+            return result
+        step = farthest * (2.0 * stream.uniforms(indices[pending], 3, first=3 * attempt) - 1.0)
+        candidate = previous[pending] + step
+        distance = np.linalg.norm(step, axis=1)
+        good = (nearest <= distance) & (distance <= farthest) & np.all((low <= candidate) & (candidate <= high), axis=1)
+        result[pending[good]] = candidate[good]
+        pending = pending[~good]
+    raise ValueError(f"no waypoint found {nearest:g} to {farthest:g} m from the last one in a box of {sampler.box_m} m")

@@ -8,12 +8,14 @@ import traceback
 from collections.abc import Sequence
 from pathlib import Path
 
-import click
 import typer
+from typer.exceptions import TyperException
 
 from lcd_flight.cli import bench, evaluation, fly, learning, mission, review
 from lcd_flight.cli.terminal import Terminal
 from lcd_flight.model.errors import LcdError, Outcome
+
+INTERRUPTED = "interrupted; run the same command again to go on"
 
 app = typer.Typer(
     name="lcd",
@@ -52,16 +54,15 @@ def run(application: typer.Typer, arguments: Sequence[str]) -> int:
     """Run a command line and return its exit code; never raises and never shows a traceback."""
     terminal = Terminal.from_arguments(arguments)
     try:
-        code = application(args=list(arguments), standalone_mode=False)
-        return int(code or 0)
-    except click.exceptions.Exit as stop:
-        return stop.exit_code
-    except click.ClickException as error:
+        code = int(application(args=list(arguments), standalone_mode=False) or 0)
+        # typer swallows Ctrl-C and returns its code
+        return terminal.fail(Outcome.INTERRUPTED, INTERRUPTED) if code == Outcome.INTERRUPTED.exit_code else code
+    except TyperException as error:
         return terminal.fail(Outcome.INVALID_INPUT, f"{error.format_message()} (--help lists the options)")
     except LcdError as error:
         return terminal.fail(error.outcome, str(error))
-    except (KeyboardInterrupt, click.Abort):
-        return terminal.fail(Outcome.INTERRUPTED, "interrupted; run the same command again to go on")
+    except KeyboardInterrupt:
+        return terminal.fail(Outcome.INTERRUPTED, INTERRUPTED)
     except BrokenPipeError:
         sys.stderr.close()  # the reader has gone: nothing is left to be said
         return Outcome.INTERRUPTED.exit_code

@@ -1,0 +1,1 @@
+"""From waypoints to a trajectory: minimum snap, the tracking cost, the projected solve."""

@@ -5,7 +5,17 @@ from lcd_flight.model.finding import Finding, Severity
 from lcd_flight.model.limits import Geofence, SafetyLimits
 from lcd_flight.model.phase import Phase
 from lcd_flight.model.plan import FlightPlan, Leg, LegKind
-from lcd_flight.model.ports import Clock, Link, LinkContext, Observer, PoseSource, RolloutOptions, Simulator
+from lcd_flight.model.ports import (
+    Clock,
+    Link,
+    LinkContext,
+    Observer,
+    PoseOptions,
+    PosePublisher,
+    PoseSource,
+    RolloutOptions,
+    Simulator,
+)
 from lcd_flight.model.rollout import CRASH_ERROR_M, RolloutLabels
 from lcd_flight.model.state import AttitudeThrust, Reference, State
 from lcd_flight.model.telemetry import LinkReport, PoseReport, RawPose, Telemetry
@@ -17,6 +27,7 @@ from lcd_flight.model.types import (
     FloatArray,
     IntArray,
     Loop,
+    MocapAxes,
     Quaternion,
     SeedArray,
     Vector3,
@@ -46,12 +57,15 @@ __all__ = [
     "LinkContext",
     "LinkReport",
     "Loop",
+    "MocapAxes",
     "MotorRequest",
     "Observer",
     "OnboardController",
     "Outcome",
     "Phase",
     "PidGains",
+    "PoseOptions",
+    "PosePublisher",
     "PoseReport",
     "PoseSource",
     "Quaternion",

@@ -12,7 +12,7 @@ from lcd_flight.model.state import AttitudeThrust
 from lcd_flight.model.telemetry import LinkReport, PoseReport
 from lcd_flight.model.tick import Tick, TickInputs
 from lcd_flight.model.trajectory import Trajectories
-from lcd_flight.model.types import FloatArray, Loop, SeedArray, Vector3
+from lcd_flight.model.types import FloatArray, Loop, MocapAxes, SeedArray, Vector3
 from lcd_flight.model.vehicle import Vehicle
 
 
@@ -112,6 +112,36 @@ class PoseSource(Protocol):
 
     def report(self, now_ns: int) -> PoseReport:
         """Drain what has arrived, and the filtered pose brought forward to `now_ns`."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class PoseOptions:
+    """How a pose source is to be read."""
+
+    axes: MocapAxes = "enu"
+    """What the mission says of the source's axes; frames that say otherwise are rejected."""
+    use_source_twist: bool = True
+    """Whether the source's own twist, where it sends one, is measured beside its pose."""
+    max_speed_m_s: float = 10.0
+    """A pose further off than this speed allows is a jump."""
+    coast_s: float = 0.1
+    """How long the filter goes on without a frame."""
+    position_noise_m: float = 1e-3
+    """Standard deviation of the source's position, each axis."""
+    attitude_noise_rad: float = 0.0087
+    """Standard deviation of the source's attitude, each axis (0.5 deg)."""
+
+
+class PosePublisher(Protocol):
+    """Where mocap frames (`lcd_flight.wire.mocap_frame`) go out. Never blocks."""
+
+    def __call__(self, data: bytes) -> None:
+        """Publish one encoded frame."""
+        ...
+
+    def close(self) -> None:
+        """Give the endpoint back."""
         ...
 
 

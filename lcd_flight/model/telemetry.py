@@ -37,6 +37,8 @@ class LinkReport:
     sent: int = 0
     received: int = 0
     lost: int = 0
+    stale: int = 0
+    """Setpoints refused because they were older than 50 ms, or older than one sent before."""
     loss_share: float = 0.0
     """Lost packets as a share, over the last second."""
     fallback_active: bool = False

@@ -25,3 +25,7 @@ Loop: TypeAlias = Literal["paper", "flight"]
 """`paper`: the SE(3) law to rotor speeds. `flight`: collective thrust and attitude to an onboard PID."""
 
 GRAVITY_M_PER_S2 = 9.81
+
+MocapAxes: TypeAlias = Literal["enu", "ned", "y_up"]
+"""How a motion capture system names its axes. `enu`: z up, body forward-left-up (ours). `ned`: z down, body
+forward-right-down. `y_up`: y up and the body's axes named likewise (x forward, y up, z right)."""

@@ -66,6 +66,11 @@ class Tasks:
         """How many tasks there are."""
         return int(self.waypoints_m.shape[0])
 
+    @property
+    def poses(self) -> FloatArray:
+        """(N, K, 4) x, y, z in m and yaw in rad, as planning takes waypoints."""
+        return np.concatenate([self.waypoints_m, self.yaws_rad[..., None]], axis=2)
+
     def take(self, indices: slice | FloatArray) -> Tasks:
         """The chosen ones."""
         return Tasks(self.waypoints_m[indices], self.yaws_rad[indices])

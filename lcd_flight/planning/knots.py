@@ -21,9 +21,10 @@ import numpy as np
 from lcd_flight.jit import Compiler
 from lcd_flight.model import COEFFICIENTS, FloatArray, IntArray, Trajectories
 from lcd_flight.planning.banded import WIDTH, solve_lower, solve_upper
-from lcd_flight.planning.minimum_snap import KERNEL_SOURCES, finite, snap
+from lcd_flight.planning.minimum_snap import KERNEL_SOURCES, check_held, snap
 from lcd_flight.planning.segments import (
     AXES,
+    largest_miss,
     optimal_knots,
     optimum_pullback,
     polynomials,
@@ -62,8 +63,10 @@ class Whitening:
         tasks, segments = durations_s.shape
         coefficients = np.empty((tasks, AXES, segments, COEFFICIENTS))
         factored = np.empty((tasks, 3 * (segments - 1), WIDTH))
-        _kernel(_solve)(waypoints, durations_s, factored, coefficients)
-        minimum = Trajectories(durations_s, finite(coefficients))
+        misses = np.empty(tasks)
+        _kernel(_solve)(waypoints, durations_s, factored, coefficients, misses)
+        check_held(misses, durations_s)
+        minimum = Trajectories(durations_s, coefficients)
         snaps = snap(minimum)
         scales = np.sqrt(np.stack([*[snaps[:, :3].sum(axis=1)] * 3, snaps[:, 3]], axis=1))
         return Whitening(waypoints, durations_s, factored, scales, minimum)
@@ -121,7 +124,9 @@ def _kernel(function: Callable[..., None]) -> Callable[..., Any]:
     return Compiler(*KERNEL_SOURCES, Path(__file__), error_model="numpy", nogil=True).kernel(function)
 
 
-def _solve(waypoints: FloatArray, durations: FloatArray, factored: FloatArray, coefficients: FloatArray) -> None:
+def _solve(
+    waypoints: FloatArray, durations: FloatArray, factored: FloatArray, coefficients: FloatArray, misses: FloatArray
+) -> None:
     """Minimum snap of each task, keeping the factor of its Hessian."""
     rows = 3 * waypoints.shape[1]
     band, knots, powers = np.empty((rows, 6)), np.empty((rows, 4)), np.empty(8)
@@ -129,6 +134,7 @@ def _solve(waypoints: FloatArray, durations: FloatArray, factored: FloatArray, c
         optimal_knots(waypoints[n], durations[n], powers, band, knots)
         factored[n] = band[3:-3]
         polynomials(waypoints[n], durations[n], knots, powers, coefficients[n])
+        misses[n] = largest_miss(waypoints[n], durations[n], coefficients[n])
 
 
 def _plan(

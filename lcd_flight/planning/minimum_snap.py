@@ -16,10 +16,12 @@ import numpy as np
 
 from lcd_flight.jit import Compiler
 from lcd_flight.model import COEFFICIENTS, FloatArray, InputError, Trajectories, Trajectory
-from lcd_flight.planning.segments import AXES, GRAM, optimal_knots, polynomials
+from lcd_flight.planning.segments import AXES, GRAM, largest_miss, optimal_knots, polynomials
 from lcd_flight.planning.times import checked_durations, checked_waypoints
 
 _FOLDER = Path(__file__).parent
+HELD = 1e-9
+"""Waypoints are held to this, in m and rad."""
 KERNEL_SOURCES = (_FOLDER / "banded.py", _FOLDER / "segments.py")
 
 
@@ -45,37 +47,43 @@ def minimum_snap_batch(waypoints: FloatArray, durations_s: FloatArray) -> Trajec
     waypoints = checked_waypoints(waypoints)
     durations_s = checked_durations(durations_s, waypoints)
     coefficients = np.empty((len(waypoints), AXES, durations_s.shape[1], COEFFICIENTS))
-    _kernel()(waypoints, durations_s, coefficients)
-    return Trajectories(durations_s, finite(coefficients))
+    misses = np.empty(len(waypoints))
+    _kernel()(waypoints, durations_s, coefficients, misses)
+    check_held(misses, durations_s)
+    return Trajectories(durations_s, coefficients)
 
 
 def snap(plans: Trajectories) -> FloatArray:
     """(N, 4) the integral of the squared snap of x, y, z (m^2/s^7) and yaw (rad^2/s^7)."""
-    times = plans.durations_s[:, None, :, None]
-    scaled = plans.coefficients[..., 4:] * times ** np.arange(4, COEFFICIENTS)
-    return np.asarray(np.einsum("nask,kl,nasl,ns->na", scaled, GRAM, scaled, plans.durations_s**-7, optimize=True))
+    scaled = plans.coefficients[..., 4:] * plans.durations_s[:, None, :, None] ** (np.arange(4) + 0.5)
+    return np.asarray(((scaled @ GRAM) * scaled).sum(axis=(2, 3)))
 
 
-def finite(coefficients: FloatArray) -> FloatArray:
-    """The same, if all of them are numbers.
+def check_held(misses: FloatArray, durations_s: FloatArray) -> None:
+    """Refuse plans that miss a waypoint: misses (N,) of plans with durations_s (N, S), m or rad.
 
     Raises:
-        InputError: they are not, because the durations are too uneven for double precision.
+        InputError: a miss above 1e-9, which rounding comes to where a plan swings out by 10 km and more.
     """
-    if not np.isfinite(coefficients).all():
-        raise InputError("durations are too uneven to plan with: bring the longest and the shortest segment nearer")
-    return coefficients
+    bad = np.flatnonzero(~(misses <= HELD))
+    if len(bad):
+        durations = durations_s[bad[0]]
+        raise InputError(
+            f"durations from {durations.min():g} s to {durations.max():g} s are so uneven that the plan swings out by "
+            "kilometres between the waypoints: bring them nearer to each other"
+        )
 
 
 @cache
-def _kernel() -> Callable[[FloatArray, FloatArray, FloatArray], None]:
+def _kernel() -> Callable[[FloatArray, FloatArray, FloatArray, FloatArray], None]:
     return Compiler(*KERNEL_SOURCES, Path(__file__), error_model="numpy", nogil=True).kernel(_solve)
 
 
-def _solve(waypoints: FloatArray, durations: FloatArray, coefficients: FloatArray) -> None:
-    """One task after another into `coefficients` (N, 4, S, 8)."""
+def _solve(waypoints: FloatArray, durations: FloatArray, coefficients: FloatArray, misses: FloatArray) -> None:
+    """One task after another into `coefficients` (N, 4, S, 8) and `misses` (N,)."""
     rows = 3 * waypoints.shape[1]
     band, knots, powers = np.empty((rows, 6)), np.empty((rows, 4)), np.empty(8)
     for n in range(waypoints.shape[0]):
         optimal_knots(waypoints[n], durations[n], powers, band, knots)
         polynomials(waypoints[n], durations[n], knots, powers, coefficients[n])
+        misses[n] = largest_miss(waypoints[n], durations[n], coefficients[n])

@@ -53,9 +53,10 @@ SNAP_STEP = np.round(HERMITE.T @ GRAM @ HERMITE_STEP)
 
 def inverse_powers(duration: float, out: FloatArray) -> None:
     """Fill `out` (8,) with T^0, T^-1 ... T^-7."""
+    inverse = 1.0 / duration
     out[0] = 1.0
     for exponent in range(1, out.shape[0]):
-        out[exponent] = out[exponent - 1] / duration
+        out[exponent] = out[exponent - 1] * inverse
 
 
 def assemble(
@@ -112,6 +113,20 @@ def polynomials(
                 for a in range(6):
                     value += HERMITE[k, a] * knots[3 * i + a, axis] * powers[3 + k - a % 3]
                 segment[4 + k] = value
+
+
+def largest_miss(waypoints: FloatArray, durations: FloatArray, coefficients: FloatArray) -> float:
+    """How far any segment's polynomial ends from its waypoint, over the axes: rounding, or NaN if anything is."""
+    miss = 0.0
+    for axis in range(AXES):
+        for i in range(durations.shape[0]):
+            value = 0.0
+            for k in range(coefficients.shape[2] - 1, -1, -1):
+                value = value * durations[i] + coefficients[axis, i, k]
+            distance = abs(value - waypoints[i + 1, axis])
+            if not distance <= miss:
+                miss = distance
+    return miss
 
 
 def polynomials_pullback(

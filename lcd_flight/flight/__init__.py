@@ -1,0 +1,1 @@
+"""Flying: phases, the pure tick, clocks and the asyncio loop that holds 100 Hz."""

@@ -6,17 +6,22 @@ is reported as evidence uses others.
 
 from __future__ import annotations
 
+from typing import Literal, TypeAlias
+
 import numpy as np
 
 from lcd_flight.learning.streams import Stream
 from lcd_flight.model import FloatArray, IntArray, Tasks, TaskSampler
 
+Purpose: TypeAlias = Literal["training", "evaluation"]
+"""Tasks of one seed that serve one purpose never serve the other."""
+
 _MOST_ATTEMPTS = 10_000
 """For one waypoint; the paper's sampler accepts about every third candidate."""
 
 
-def sample_tasks(sampler: TaskSampler, seed: int, indices: IntArray) -> Tasks:
-    """The tasks with the given global indices (N,).
+def sample_tasks(sampler: TaskSampler, seed: int, indices: IntArray, purpose: Purpose = "evaluation") -> Tasks:
+    """The tasks with the given global indices (N,); those for training are others than those for evaluation.
 
     Each waypoint is uniform in the part of the box that lies within the sampler's distances of the previous one
     (paper, "Data Collection": drawn in the domain, kept when at least 1 m and no more than 3 m from the previous).
@@ -27,16 +32,16 @@ def sample_tasks(sampler: TaskSampler, seed: int, indices: IntArray) -> Tasks:
     indices = np.asarray(indices, dtype=np.int64)
     waypoints = np.empty((len(indices), sampler.waypoints, 3))
     low, high = _box(sampler)
-    waypoints[:, 0] = low + (high - low) * Stream(seed, "task/first").uniforms(indices, 3)
+    waypoints[:, 0] = low + (high - low) * Stream(seed, f"{purpose}/first").uniforms(indices, 3)
     for k in range(1, sampler.waypoints):
-        stream = Stream(seed, f"task/waypoint/{k}")
+        stream = Stream(seed, f"{purpose}/waypoint/{k}")
         waypoints[:, k] = _next_waypoint(sampler, stream, indices, waypoints[:, k - 1])
-    turns = 2.0 * Stream(seed, "task/yaw").uniforms(indices, sampler.waypoints) - 1.0
+    turns = 2.0 * Stream(seed, f"{purpose}/yaw").uniforms(indices, sampler.waypoints) - 1.0
     return Tasks(waypoints, sampler.yaw_span_rad * turns)
 
 
 def first_tasks(sampler: TaskSampler, seed: int, count: int) -> Tasks:
-    """Tasks 0 to `count` - 1 of a seed."""
+    """Tasks 0 to `count` - 1 of a seed, as evaluated and as named in documents."""
     return sample_tasks(sampler, seed, np.arange(count))
 
 

@@ -2,7 +2,7 @@
 
 So row i of a data set is the same whatever the count, the grouping into shards, the number of cores or the machine.
 The generator is SplitMix64 (Steele, Lea and Flood, OOPSLA 2014) in its counter form, one sub-stream for each index.
-Domains ("task", "rollout noise", "evaluation noise", ...) are hashed into the key: streams of different domains, and
+Domains ("training/noise", "evaluation/noise", ...) are hashed into the key: streams of different domains, and
 of different seeds of one domain, have nothing to do with each other.
 """
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lcd_flight.model.types import FloatArray, Loop, Vector3
+from lcd_flight.model.types import FloatArray, IntArray, Loop, Vector3
 from lcd_flight.model.vehicle import Vehicle
 
 
@@ -71,7 +71,7 @@ class Tasks:
         """(N, K, 4) x, y, z in m and yaw in rad, as planning takes waypoints."""
         return np.concatenate([self.waypoints_m, self.yaws_rad[..., None]], axis=2)
 
-    def take(self, indices: slice | FloatArray) -> Tasks:
+    def take(self, indices: slice | IntArray) -> Tasks:
         """The chosen ones."""
         return Tasks(self.waypoints_m[indices], self.yaws_rad[indices])
 

@@ -119,9 +119,12 @@ class Whitening:
         return np.asarray(z * self.scales[:, None, None, :]).reshape(len(self), -1, AXES)
 
 
+_COMPILER = Compiler(*KERNEL_SOURCES, Path(__file__), error_model="numpy", nogil=True)
+
+
 @cache
 def _kernel(function: Callable[..., None]) -> Callable[..., Any]:
-    return Compiler(*KERNEL_SOURCES, Path(__file__), error_model="numpy", nogil=True).kernel(function)
+    return _COMPILER.kernel(function)
 
 
 def _solve(

@@ -69,8 +69,8 @@ def check_held(misses: FloatArray, durations_s: FloatArray) -> None:
     if len(bad):
         durations = durations_s[bad[0]]
         raise InputError(
-            f"durations from {durations.min():g} s to {durations.max():g} s are so uneven that the plan swings out by "
-            "kilometres between the waypoints: bring them nearer to each other"
+            f"durations from {durations.min():g} s to {durations.max():g} s make a plan that double precision cannot "
+            f"hold to its waypoints within {HELD:g}: bring the durations nearer to each other"
         )
 
 

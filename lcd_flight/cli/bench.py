@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib.machinery
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -46,10 +46,9 @@ def _load(name: str) -> ModuleType:
     """The benchmark's module."""
     if name not in _names():
         raise InputError(f"no benchmark {name!r}; there are {', '.join(_names())}")
-    spec = importlib.util.spec_from_file_location(f"bench_{name}", FOLDER / f"bench_{name}.py")
-    assert spec is not None and spec.loader is not None  # noqa: S101 - the file was listed a line ago
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    loader = importlib.machinery.SourceFileLoader(f"bench_{name}", str(FOLDER / f"bench_{name}.py"))
+    module = ModuleType(loader.name)
+    loader.exec_module(module)
     return module
 
 

@@ -9,16 +9,21 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from lcd_flight.model.errors import Outcome
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.progress import Progress
+    from rich.progress import Progress as ProgressBar
+
+    from lcd_flight.learning.progress import Progress
 
 LABEL_WIDTH = 11
+LINE_PERIOD_S = 10.0
 
 
 class Terminal:
@@ -89,11 +94,12 @@ class Terminal:
             print(json.dumps({"outcome": outcome.value, "error": message, **_plain(result or {})}, allow_nan=False))  # noqa: T201
         return outcome.exit_code
 
-    def progress(self) -> Progress:
+    def progress_bar(self) -> ProgressBar:
         """A progress display for long work; silent where nobody watches."""
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+        from rich.progress import Progress as ProgressBar
 
-        return Progress(
+        return ProgressBar(
             TextColumn("{task.description:<10}"),
             BarColumn(),
             MofNCompleteColumn(),
@@ -103,6 +109,29 @@ class Terminal:
             disable=not self.interactive,
             transient=True,
         )
+
+
+@contextmanager
+def following(terminal: Terminal, label: str) -> Iterator[Callable[[Progress], None]]:
+    """Show the progress of long work: a bar for a person, a line every ten seconds for a pipe."""
+    if terminal.interactive:
+        with terminal.progress_bar() as bar:
+            task = bar.add_task(label, total=None, note="")
+            yield lambda p: bar.update(task, total=p.total, completed=p.done, note=_rate(p))
+        return
+    shown_s = time.monotonic()
+
+    def show(progress: Progress) -> None:
+        nonlocal shown_s
+        if time.monotonic() - shown_s >= LINE_PERIOD_S:
+            shown_s = time.monotonic()
+            terminal.line(label, f"{progress.done:,}/{progress.total:,} {_rate(progress)}")
+
+    yield show
+
+
+def _rate(progress: Progress) -> str:
+    return f"{progress.unit} {progress.note}  {progress.rate:,.0f}/s"
 
 
 def _plain(value: Any) -> Any:

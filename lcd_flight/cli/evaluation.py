@@ -1,0 +1,86 @@
+"""`lcd evaluate`: crash rates of planning methods on the same tasks and the same noise."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from lcd_flight.cli.options import Json, NoColor, Quiet
+from lcd_flight.cli.terminal import Terminal, following
+from lcd_flight.model.errors import InputError, Outcome
+
+if TYPE_CHECKING:
+    from lcd_flight.learning.evaluate import Evaluation
+
+
+def evaluate(
+    world: Annotated[str, typer.Option(help="A world's name, e.g. crazyflie-saturated.")],
+    count: Annotated[int, typer.Option(help="How many tasks to sample.", min=1)] = 300,
+    seed: Annotated[int, typer.Option(help="Of tasks and noise.", min=0)] = 0,
+    methods: Annotated[str, typer.Option(help="Names, separated by commas.")] = "minimum-snap,learned",
+    tasks: Annotated[Path | None, typer.Option(help="Tasks from a .npz file in place of the sampler.")] = None,
+    waypoints: Annotated[
+        int | None, typer.Option(help="Waypoints of a sampled task; the world's own otherwise.", min=2)
+    ] = None,
+    timing: Annotated[str, typer.Option(help="retimed (at equal total time) or fixed.")] = "retimed",
+    drag: Annotated[int, typer.Option(help="Drag configuration, 1 to 5.")] = 3,
+    noise_seeds: Annotated[int, typer.Option(help="Flights of each plan.", min=1)] = 3,
+    model: Annotated[str | None, typer.Option(help="Learned cost by name or file; the world's own otherwise.")] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+    no_color: NoColor = False,
+) -> int:
+    """Measure how many planned tasks crash: the largest position error above 1.5 m."""
+    from dataclasses import replace
+
+    from lcd_flight import plugins
+    from lcd_flight.learning.evaluate import EvaluationOptions
+    from lcd_flight.learning.evaluate import evaluate as evaluate_methods
+    from lcd_flight.learning.task_files import load_tasks
+    from lcd_flight.worlds import load_world
+
+    if timing not in ("retimed", "fixed"):
+        raise InputError(f"--timing {timing}: choose retimed or fixed")
+    terminal = Terminal(json_line=json, quiet=quiet, color=not no_color)
+    where = load_world(world)
+    if waypoints is not None:
+        where = replace(where, sampler=replace(where.sampler, waypoints=waypoints))
+    options = EvaluationOptions(
+        seed=seed,
+        timing="fixed" if timing == "fixed" else "retimed",
+        drag=drag,
+        noise_seeds=noise_seeds,
+        model=model,
+    )
+    names = [name.strip() for name in methods.split(",") if name.strip()]
+    work = load_tasks(tasks) if tasks else count
+    with following(terminal, "EVALUATE") as progress:
+        evaluation = evaluate_methods(where, names, work, plugins.simulator(), options, progress)
+    _show(terminal, evaluation)
+    return terminal.finish(Outcome.OK, evaluation.as_json())
+
+
+def _show(terminal: Terminal, evaluation: Evaluation) -> None:
+    """The table for people."""
+    from rich.table import Table
+
+    table = Table(title=f"{evaluation.world}: crash rate, largest position error above 1.5 m")
+    table.add_column("method")
+    for column in ("crash %", "std. error", "tasks x noise", "median max m", "waypoint m", "snap ratio", "plan ms"):
+        table.add_column(column, justify="right")
+    for name, row in evaluation.methods.items():
+        error = "" if row.crash_rate_error is None else f"{row.crash_rate_error:.1f}"
+        table.add_row(
+            name,
+            f"{row.crash_rate:.1f}",
+            error,
+            f"{row.tasks} x {row.noise_seeds}",
+            f"{row.median_max_error_m:.2f}",
+            f"{row.median_waypoint_error_m:.2f}",
+            f"{row.median_relative_snap:.2f}",
+            f"{row.plan_time_ms:.2f}",
+        )
+    if not terminal.quiet:
+        terminal.console.print(table)

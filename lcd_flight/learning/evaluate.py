@@ -16,7 +16,6 @@ import numpy as np
 from lcd_flight.learning.methods import Planned, Problem, Timing, find_method, shipped_model
 from lcd_flight.learning.progress import Meter, ProgressCallback, ignore
 from lcd_flight.learning.sampling import first_tasks
-from lcd_flight.learning.streams import Stream
 from lcd_flight.model import (
     BoolArray,
     FloatArray,
@@ -28,6 +27,7 @@ from lcd_flight.model import (
     Vehicle,
     World,
 )
+from lcd_flight.model.streams import Stream
 from lcd_flight.planning.minimum_snap import minimum_snap_batch, snap
 
 _MOST_NOISE_SEEDS = 1 << 20

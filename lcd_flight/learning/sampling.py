@@ -10,8 +10,8 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from lcd_flight.learning.streams import Stream
 from lcd_flight.model import FloatArray, IntArray, Tasks, TaskSampler
+from lcd_flight.model.streams import Stream
 
 Purpose: TypeAlias = Literal["training", "evaluation"]
 """Tasks of one seed that serve one purpose never serve the other."""

@@ -10,8 +10,8 @@ import numpy as np
 
 from lcd_flight.learning.rollouts import Plans, Source
 from lcd_flight.learning.sampling import sample_tasks
-from lcd_flight.learning.streams import Stream
 from lcd_flight.model import FloatArray, IntArray, Tasks, TaskSampler
+from lcd_flight.model.streams import Stream
 from lcd_flight.planning.knots import Whitening
 from lcd_flight.planning.times import shortest_yaw
 

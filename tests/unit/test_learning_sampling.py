@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from lcd_flight.learning.sampling import first_tasks, sample_tasks
-from lcd_flight.learning.streams import Stream
 from lcd_flight.model import TaskSampler
+from lcd_flight.model.streams import Stream
 
 PAPER = TaskSampler(waypoints=4, box_m=(10.0, 10.0, 10.0), distance_m=(1.0, 3.0), yaw_span_rad=0.85 * math.pi)
 

@@ -12,7 +12,7 @@ import hashlib
 
 import numpy as np
 
-from lcd_flight.model import FloatArray, IntArray, SeedArray
+from lcd_flight.model.types import FloatArray, IntArray, SeedArray
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 

@@ -1,0 +1,45 @@
+"""From stored rows back to what was flown, and its features: the same arithmetic as when it was flown."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from lcd_flight.learning.rollouts import Plans
+from lcd_flight.learning.sources import training_tasks, whitening
+from lcd_flight.model import FloatArray, Trajectories, World
+from lcd_flight.planning.cost.features import segment_features
+from lcd_flight.planning.knots import Whitening
+
+_ROWS_AT_A_TIME = 2048
+
+
+def variables(world: World, seed: int, plans: Plans) -> Whitening:
+    """The planner's variables for each row's task."""
+    task, row_task = np.unique(plans.task, return_inverse=True)
+    return whitening(training_tasks(world.sampler, seed, task), world.speed).take(row_task)
+
+
+def trajectories(world: World, seed: int, plans: Plans) -> Trajectories:
+    """The plans as polynomials."""
+    space = variables(world, seed, plans)
+    return space.plan(plans.z.astype(np.float64).reshape(space.z_shape), plans.theta.astype(np.float64))
+
+
+def features(plans: Trajectories) -> FloatArray:
+    """(N, S, 114) features of each segment, on all cores."""
+
+    def part(rows: slice) -> FloatArray:
+        return segment_features(plans.durations_s[rows], plans.coefficients[rows])
+
+    return np.concatenate(in_slices(part, len(plans)))
+
+
+def in_slices(part: Callable[[slice], FloatArray], rows: int) -> list[FloatArray]:
+    """What `part` gives for slices of the rows, in order; it must release the interpreter's lock to gain from this."""
+    slices = [slice(i, min(i + _ROWS_AT_A_TIME, rows)) for i in range(0, rows, _ROWS_AT_A_TIME)]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(part, slices))

@@ -6,7 +6,7 @@ number of cores or on the count asked for.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -15,21 +15,22 @@ from lcd_flight.learning.dataset import Dataset
 from lcd_flight.learning.fingerprint import described
 from lcd_flight.learning.progress import Meter, ProgressCallback, ignore
 from lcd_flight.learning.rebuild import trajectories
-from lcd_flight.learning.rollouts import Plans, Rollouts
-from lcd_flight.learning.sources import optima, random_plans
-from lcd_flight.learning.streams import Stream
+from lcd_flight.learning.rollouts import Plans, Rollouts, Source
+from lcd_flight.learning.sources import optima, random_plans, training_tasks, whitening
 from lcd_flight.model import IntArray, RolloutLabels, RolloutOptions, Simulator, World
+from lcd_flight.model.streams import Stream
+from lcd_flight.planning.search import Arena, Generation, SearchSettings, search
 
 
 @dataclass(frozen=True, slots=True)
 class Mix:
     """What a shard is made of."""
 
-    search_tasks: int = 72
+    search_tasks: int = 150
     """Tasks that are searched in the simulator; every sample of a search is a row."""
-    search_population: int = 80
-    search_generations: int = 5
-    random_tasks: int = 992
+    search_population: int = 32
+    search_generations: int = 12
+    random_tasks: int = 1984
     """Tasks with their minimum snap and random perturbations of it."""
     random_draws: int = 3
     """Perturbations of each."""
@@ -90,11 +91,45 @@ def shard(config: CollectConfig, number: int, simulator: Simulator) -> Rollouts:
     """All rows of one shard: those of the searches, then optima and random perturbations."""
     mix, segments = config.mix, config.world.sampler.waypoints - 1
     task = number * mix.tasks + np.arange(mix.tasks)
-    chosen = task[mix.search_tasks :]
-    task_of_draw = np.repeat(chosen, mix.random_draws)
-    draw = np.tile(np.arange(mix.random_draws), len(chosen))
-    plans = Plans.concatenate([optima(chosen, segments), random_plans(config.seed, task_of_draw, draw, segments)])
-    return fly(config, plans, number * mix.rows + np.arange(len(plans)), simulator)
+    searched, chosen = task[: mix.search_tasks], task[mix.search_tasks :]
+    draws = np.tile(np.arange(mix.random_draws), len(chosen))
+    perturbed = random_plans(config.seed, np.repeat(chosen, mix.random_draws), draws, segments)
+    plans = Plans.concatenate([optima(chosen, segments), perturbed])
+    rows = number * mix.rows + np.arange(len(plans))
+    return Rollouts.concatenate([*searches(config, searched, simulator), fly(config, plans, rows, simulator)])
+
+
+def searches(config: CollectConfig, task: IntArray, simulator: Simulator) -> list[Rollouts]:
+    """Every sample of a search from minimum snap for each task (N,), generation by generation."""
+    found: list[Rollouts] = []
+    settings = SearchSettings(config.mix.search_population, config.mix.search_generations)
+    for drag, members in _by_drag(config.drag(task)):
+        chosen = task[members]
+        space = whitening(training_tasks(config.world.sampler, config.seed, chosen), config.world.speed)
+        search(
+            space,
+            np.zeros(space.z_shape),
+            np.zeros(space.durations_s.shape),
+            Arena(simulator, config.world.vehicle(drag), options_of(config.world)),
+            seed=config.seed,
+            tasks=chosen,
+            settings=settings,
+            watch=lambda g, chosen=chosen, drag=drag: found.append(_rollouts(g, chosen, drag)),  # type: ignore[misc]
+        )
+    return found
+
+
+def _rollouts(generation: Generation, task: IntArray, drag: int) -> Rollouts:
+    """The rows of one generation."""
+    tasks, population = generation.costs.shape
+    count = tasks * population
+    plans = Plans(
+        np.repeat(task, population),
+        np.full(count, Source.SEARCH),
+        generation.z.reshape(count, -1).astype(np.float32),
+        generation.theta.reshape(count, -1).astype(np.float32),
+    )
+    return Rollouts(plans, np.full(count, drag), np.repeat(generation.noise_seed, population), generation.labels)
 
 
 def fly(config: CollectConfig, plans: Plans, rows: IntArray, simulator: Simulator) -> Rollouts:
@@ -105,13 +140,19 @@ def fly(config: CollectConfig, plans: Plans, rows: IntArray, simulator: Simulato
     drag = config.drag(plans.task)
     seeds = Stream(config.seed, "training/noise").seeds(rows)
     flown = trajectories(config.world, config.seed, plans)
-    options = RolloutOptions(loop=config.world.loop, start_aligned=config.world.start_aligned)
-    order, parts = [], []
-    for configuration in sorted(set(drag.tolist())):
-        chosen = np.flatnonzero(drag == configuration)
-        vehicle = config.world.vehicle(configuration)
-        parts.append(simulator.rollout(flown.take(chosen), vehicle, seeds[chosen], options))
-        order.append(chosen)
-    back = np.argsort(np.concatenate(order))
+    options = options_of(config.world)
+    groups = _by_drag(drag)
+    parts = [simulator.rollout(flown.take(m), config.world.vehicle(d), seeds[m], options) for d, m in groups]
     labels = RolloutLabels.concatenate(parts)
-    return Rollouts(plans, drag, seeds, RolloutLabels(*(getattr(labels, f.name)[back] for f in fields(RolloutLabels))))
+    back = np.argsort(np.concatenate([members for _, members in groups]))
+    return Rollouts(plans, drag, seeds, labels.take(back))
+
+
+def options_of(world: World) -> RolloutOptions:
+    """How a world's rollouts are flown."""
+    return RolloutOptions(loop=world.loop, start_aligned=world.start_aligned)
+
+
+def _by_drag(drag: IntArray) -> list[tuple[int, IntArray]]:
+    """Each configuration that occurs, and the rows it occurs in."""
+    return [(d, np.flatnonzero(drag == d)) for d in sorted(set(drag.tolist()))]

@@ -73,8 +73,7 @@ class Rollouts:
 
     def take(self, rows: slice | IntArray) -> Rollouts:
         """The chosen rows."""
-        labels = RolloutLabels(*(getattr(self.labels, f.name)[rows] for f in fields(RolloutLabels)))
-        return Rollouts(self.plans.take(rows), self.drag[rows], self.noise_seed[rows], labels)
+        return Rollouts(self.plans.take(rows), self.drag[rows], self.noise_seed[rows], self.labels.take(rows))
 
     @staticmethod
     def concatenate(parts: list[Rollouts]) -> Rollouts:

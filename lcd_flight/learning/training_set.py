@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from lcd_flight.learning.rebuild import features, trajectories
 from lcd_flight.learning.rollouts import Rollouts
-from lcd_flight.learning.streams import Stream
 from lcd_flight.learning.targets import targets
 from lcd_flight.model import BoolArray, FloatArray, IntArray, World
+from lcd_flight.model.streams import Stream
 
 TRAINING_SHARE = 0.8
 """Of the tasks; the others validate. By task, never by rollout: the rollouts of one task resemble each other."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from lcd_flight.model.types import BoolArray, FloatArray
+from lcd_flight.model.types import BoolArray, FloatArray, IntArray
 
 CRASH_ERROR_M = 1.5
 """The paper's crash bound on the largest position error."""
@@ -55,6 +55,10 @@ class RolloutLabels:
     def __len__(self) -> int:
         """How many rollouts there are."""
         return len(self.max_error_m)
+
+    def take(self, rows: slice | IntArray) -> RolloutLabels:
+        """The chosen rows."""
+        return RolloutLabels(*(getattr(self, f.name)[rows] for f in fields(RolloutLabels)))
 
     @staticmethod
     def concatenate(parts: list[RolloutLabels]) -> RolloutLabels:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lcd_flight.model.state import Reference
-from lcd_flight.model.types import FloatArray
+from lcd_flight.model.types import FloatArray, IntArray
 
 COEFFICIENTS = 8
 """Order 7: eight coefficients a segment and axis (paper, problem 3)."""
@@ -136,7 +136,7 @@ class Trajectories:
         """Each of them in turn (views)."""
         return (self[i] for i in range(len(self)))
 
-    def take(self, indices: FloatArray | Sequence[int]) -> Trajectories:
+    def take(self, indices: IntArray | Sequence[int]) -> Trajectories:
         """The chosen ones, repeated where an index is (a copy)."""
         chosen = np.asarray(indices)
         return Trajectories(self.durations_s[chosen], self.coefficients[chosen])

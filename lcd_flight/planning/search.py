@@ -73,6 +73,8 @@ class Generation:
     """Of the plans."""
     costs: FloatArray
     """(N, P)"""
+    noise_seed: SeedArray
+    """(N,) of each task's population."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -153,7 +155,7 @@ def _fly(number: int, samples: FloatArray, crowd: Whitening, arena: Arena, noise
     theta = samples[..., inner * rows * axes :]
     plans = crowd.plan(z.reshape(crowd.z_shape), theta.reshape(count * size, -1))
     labels = arena.simulator.rollout(plans, arena.vehicle, np.repeat(noise, size), arena.options)
-    return Generation(number, z, theta, plans, labels, tracking_cost(labels).reshape(count, size))
+    return Generation(number, z, theta, plans, labels, tracking_cost(labels).reshape(count, size), noise)
 
 
 def _elite_moments(

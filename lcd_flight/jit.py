@@ -54,7 +54,7 @@ class Compiler:
         if function not in self._helpers:
             import numba
 
-            self._helpers[function] = numba.njit(**self._options)(_relink(function, self._inlined))
+            self._helpers[function] = numba.njit(forceinline=True, **self._options)(_relink(function, self._inlined))
         return self._helpers[function]
 
     def _cache(self) -> Path:

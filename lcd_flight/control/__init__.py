@@ -1,0 +1,1 @@
+"""Control laws: pure functions on scalars, written once for the tick and for the simulator's kernels."""

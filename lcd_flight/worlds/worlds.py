@@ -1,0 +1,74 @@
+"""Worlds: `data/worlds/*.yaml`. A change of a figure is a new version, since results name world and version."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from lcd_flight.model import InputError, TaskSampler, World
+from lcd_flight.worlds.data_file import Strict, read
+from lcd_flight.worlds.vehicles import Amounts, NotNegative, Positive, load_vehicle
+
+_DATA = Path(__file__).parent / "data" / "worlds"
+
+
+class SamplerData(Strict):
+    """See `model.TaskSampler`."""
+
+    waypoints: Annotated[int, Field(ge=2)]
+    box_m: tuple[Positive, Positive, Positive]
+    distance_m: tuple[Positive, Positive]
+    yaw_span_rad: NotNegative
+
+
+class WorldData(Strict):
+    """A world file; keys are those of `model.World`."""
+
+    name: str
+    version: Annotated[int, Field(ge=1)]
+    vehicle: str
+    motor_time_constant_s: Positive
+    motor_noise: NotNegative
+    drag_configurations: Annotated[tuple[Amounts, ...], Field(min_length=1)]
+    speed: Positive
+    sampler: SamplerData
+    loop: Literal["paper", "flight"]
+    start_aligned: bool
+    source: str
+
+
+def world_names() -> list[str]:
+    """The worlds that ship."""
+    return sorted(path.stem for path in _DATA.glob("*.yaml"))
+
+
+@cache
+def load_world(name: str) -> World:
+    """A world by name.
+
+    Raises:
+        InputError: there is none of this name.
+    """
+    if name not in world_names():
+        raise InputError(f"world {name!r} is not known; worlds: {', '.join(world_names())}")
+    data = read(_DATA / f"{name}.yaml", WorldData)
+    vehicle = replace(
+        load_vehicle(data.vehicle),
+        motor_time_constant_s=data.motor_time_constant_s,
+        motor_noise=data.motor_noise,
+    )
+    return World(
+        name=data.name,
+        version=data.version,
+        base_vehicle=vehicle,
+        drag_configurations=data.drag_configurations,
+        speed=data.speed,
+        sampler=TaskSampler(**data.sampler.model_dump()),
+        loop=data.loop,
+        start_aligned=data.start_aligned,
+        source=data.source,
+    )

@@ -1,0 +1,215 @@
+"""What one vehicle of a batch does in one tick; the kernel runs each of these over all lanes.
+
+`memory` is laid out by `rows`. No branches and no calls that remain: each function becomes one vector loop.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from lcd_flight.control.geometric import (
+    Allocation,
+    Row4,
+    acceleration_setpoint,
+    attitude_setpoint,
+    clipped,
+    dot,
+    moment,
+    rotation_of,
+    rotor_speeds,
+    scaled,
+)
+from lcd_flight.model import FloatArray, Vector3
+from sim_bridge import rows
+from sim_bridge.elementary import arctan2, cos_sin
+from sim_bridge.multirotor import Airframe, Motion, lagged, normalized, rotor_sums, step
+from sim_bridge.noise import normal_pair
+from sim_bridge.rows import LANES, load3, load4, load_motion, store3, store4, store_motion
+
+TICK_S = 0.01
+"""The control step."""
+SUBSTEPS = 2
+"""Runge-Kutta steps of a tick: 0.05 mm from the converged solution over 4.5 s."""
+MAX_SPEED = 20.0
+"""m/s, each axis: RotorPy's early exit."""
+MAX_RATE = 100.0
+"""rad/s, each axis: likewise."""
+
+
+class Law(NamedTuple):
+    """What the controller believes of the vehicle and how it is tuned."""
+
+    mass_kg: float
+    inertia_kg_m2: Vector3
+    position_gain: Vector3
+    velocity_gain: Vector3
+    attitude_gain: float
+    rate_gain: float
+    allocation: Allocation
+
+
+class Sample(NamedTuple):
+    """The reference at a tick, as the law needs it."""
+
+    p_W: Vector3
+    v_W: Vector3
+    a_W: Vector3
+    yaw_rad: float
+    yaw_rate: float
+
+
+def remember(memory: FloatArray, lane: int) -> None:
+    """Keep position and velocity of the tick that ends."""
+    motion = load_motion(memory, rows.MOTION, lane)
+    store3(memory, rows.BEFORE, lane, motion.p_WB)
+    store3(memory, rows.BEFORE + 3, lane, motion.v_WB_W)
+
+
+def advance(memory: FloatArray, lane: int, air: Airframe, step_s: float, decay: float) -> None:
+    """Fly one Runge-Kutta step under constant commands. decay: exp(-t / tau) of half the step."""
+    motion = load_motion(memory, rows.MOTION, lane)
+    speeds, commands = load4(memory, rows.SPEEDS, lane), load4(memory, rows.COMMANDS, lane)
+    middle = lagged(speeds, commands, decay)
+    end = lagged(middle, commands, decay)
+    moved = step(motion, rotor_sums(speeds, air), rotor_sums(middle, air), rotor_sums(end, air), air, step_s)
+    store_motion(memory, rows.MOTION, lane, Motion(moved.p_WB, moved.v_WB_W, normalized(moved.q_WB), moved.w_WB_B))
+    store4(memory, rows.SPEEDS, lane, end)
+
+
+def disturb(memory: FloatArray, lane: int, key: np.uint64, tick: np.uint64, air: Airframe, noise: float) -> None:
+    """Add the tick's motor noise, then hold the rotor speeds within their limits. noise: rad/s."""
+    speeds = load4(memory, rows.SPEEDS, lane)
+    a, b = normal_pair(key, tick + tick)
+    c, d = normal_pair(key, tick + tick + np.uint64(1))
+    low, high = air.speed_min, air.speed_max
+    disturbed = (
+        clipped(speeds[0] + noise * a, low, high),
+        clipped(speeds[1] + noise * b, low, high),
+        clipped(speeds[2] + noise * c, low, high),
+        clipped(speeds[3] + noise * d, low, high),
+    )
+    store4(memory, rows.SPEEDS, lane, disturbed)
+
+
+def look(memory: FloatArray, lane: int, tick: float) -> None:
+    """Give the controller the motion; within a gap of the pose its last velocity and attitude go on."""
+    motion = load_motion(memory, rows.MOTION, lane)
+    seen = load_motion(memory, rows.SEEN, lane)
+    p, v, q, w = seen
+    gap = (tick >= memory[rows.GAP_START * LANES + lane]) & (tick < memory[rows.GAP_END * LANES + lane])
+    coasted = (p[0] + TICK_S * v[0], p[1] + TICK_S * v[1], p[2] + TICK_S * v[2])
+    store3(memory, rows.SEEN, lane, chosen3(gap, coasted, motion.p_WB))
+    store3(memory, rows.SEEN + 3, lane, chosen3(gap, v, motion.v_WB_W))
+    store4(memory, rows.SEEN + 6, lane, chosen4(gap, q, motion.q_WB))
+    store3(memory, rows.SEEN + 10, lane, chosen3(gap, (0.0, 0.0, 0.0), motion.w_WB_B))
+
+
+def chosen3(condition: bool, a: Vector3, b: Vector3) -> Vector3:
+    """`a` where the condition holds, else `b`."""
+    return (a[0] if condition else b[0], a[1] if condition else b[1], a[2] if condition else b[2])
+
+
+def chosen4(condition: bool, a: Row4, b: Row4) -> Row4:
+    """`a` where the condition holds, else `b`."""
+    return (
+        a[0] if condition else b[0],
+        a[1] if condition else b[1],
+        a[2] if condition else b[2],
+        a[3] if condition else b[3],
+    )
+
+
+def reference(memory: FloatArray, lane: int, tick: float) -> Sample:
+    """The plan at a tick; after its end, at rest there (plans end at rest)."""
+    time = min(TICK_S * tick, memory[rows.DURATION * LANES + lane]) - memory[rows.SEGMENT_START * LANES + lane]
+    x = horner(memory, rows.COEFFICIENTS, lane, time)
+    y = horner(memory, rows.COEFFICIENTS + 8, lane, time)
+    z = horner(memory, rows.COEFFICIENTS + 16, lane, time)
+    yaw = horner(memory, rows.COEFFICIENTS + 24, lane, time)
+    return Sample((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2]), yaw[0], yaw[1])
+
+
+def horner(memory: FloatArray, row: int, lane: int, time: float) -> Vector3:
+    """Value, first and second derivative of the polynomial of order 7 whose coefficients begin at `row`."""
+    value, first, half_second = memory[(row + 7) * LANES + lane], 0.0, 0.0
+    for k in range(6, -1, -1):
+        half_second = half_second * time + first
+        first = first * time + value
+        value = value * time + memory[(row + k) * LANES + lane]
+    return (value, first, 2.0 * half_second)
+
+
+def judge(memory: FloatArray, lane: int, tick: float, ref: Sample) -> None:
+    """Add this tick's errors to the labels, unless the rollout is over or has left the model's validity."""
+    at = lane
+    motion = load_motion(memory, rows.MOTION, lane)
+    p, v, q, w = motion
+    fastest = max(max(abs(v[0]), abs(v[1])), abs(v[2]))
+    quickest = max(max(abs(w[0]), abs(w[1])), abs(w[2]))
+    alive = (memory[rows.ALIVE * LANES + at] > 0.0) & (fastest <= MAX_SPEED) & (quickest <= MAX_RATE)
+    running = tick <= memory[rows.LAST_TICK * LANES + at]
+    memory[rows.ALIVE * LANES + at] = 1.0 if alive else (0.0 if running else memory[rows.ALIVE * LANES + at])
+    counts = alive & running
+    e = (p[0] - ref.p_W[0], p[1] - ref.p_W[1], p[2] - ref.p_W[2])
+    e_v = (v[0] - ref.v_W[0], v[1] - ref.v_W[1], v[2] - ref.v_W[2])
+    square = dot(e, e)
+    yaw = arctan2(2.0 * (q[3] * q[2] + q[0] * q[1]), 1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2]))
+    e_yaw = yaw - ref.yaw_rad
+    wrapped = e_yaw - 2.0 * math.pi * np.floor(e_yaw / (2.0 * math.pi) + 0.5)
+    largest = memory[rows.LARGEST * LANES + at]
+    record = counts & (square > largest)
+    memory[rows.LARGEST * LANES + at] = square if record else largest
+    memory[rows.LARGEST_TICK * LANES + at] = tick if record else memory[rows.LARGEST_TICK * LANES + at]
+    segment_largest = memory[rows.SEGMENT_LARGEST * LANES + at]
+    memory[rows.SEGMENT_LARGEST * LANES + at] = max(segment_largest, square) if counts else segment_largest
+    add(memory, rows.SAMPLES, lane, 1.0, counts)
+    add(memory, rows.SUM, lane, math.sqrt(square), counts)
+    add(memory, rows.SUM_2, lane, square, counts)
+    add(memory, rows.SUM_8, lane, (square * square) * (square * square), counts)
+    add(memory, rows.YAW_COST, lane, 2.0 * (1.0 - cos_sin(e_yaw)[0]), counts)
+    add(memory, rows.PAPER_COST, lane, square + wrapped * wrapped, counts)
+    add(memory, rows.RELEASED_COST, lane, square + dot(e_v, e_v) + e_yaw * e_yaw, counts)
+
+
+def add(memory: FloatArray, row: int, lane: int, value: float, counts: bool) -> None:
+    """Add to a label where the tick counts."""
+    memory[row * LANES + lane] += value if counts else 0.0
+
+
+def command_rotors(memory: FloatArray, lane: int, tick: float, ref: Sample, law: Law, air: Airframe) -> None:
+    """The paper's loop: the law's force and moment straight to rotor speeds."""
+    p, v, q, w = load_motion(memory, rows.SEEN, lane)
+    acceleration = acceleration_setpoint(p, v, ref.p_W, ref.v_W, ref.a_W, law.position_gain, law.velocity_gain)
+    force = scaled(acceleration, law.mass_kg)
+    R_WB = rotation_of(q)
+    R_WD = attitude_setpoint(force, cos_sin(ref.yaw_rad))
+    turn = moment(R_WB, R_WD, w, ref.yaw_rate, law.inertia_kg_m2, law.attitude_gain, law.rate_gain)
+    wanted = rotor_speeds(dot(force, R_WB[2]), turn, law.allocation)
+    low, high = air.speed_min, air.speed_max
+    given = (
+        clipped(wanted[0], low, high),
+        clipped(wanted[1], low, high),
+        clipped(wanted[2], low, high),
+        clipped(wanted[3], low, high),
+    )
+    store4(memory, rows.COMMANDS, lane, given)
+    clips = (
+        (1.0 if wanted[0] != given[0] else 0.0)
+        + (1.0 if wanted[1] != given[1] else 0.0)
+        + (1.0 if wanted[2] != given[2] else 0.0)
+        + (1.0 if wanted[3] != given[3] else 0.0)
+    )
+    count_clips(memory, lane, tick, clips)
+
+
+def count_clips(memory: FloatArray, lane: int, tick: float, clips: float) -> None:
+    """Add to the saturation labels. clips: motor commands clipped in this tick."""
+    counts = (memory[rows.ALIVE * LANES + lane] > 0.0) & (tick <= memory[rows.LAST_TICK * LANES + lane])
+    add(memory, rows.CLIPPED, lane, clips, counts)
+    run = memory[rows.RUN * LANES + lane] + 1.0 if clips > 0.0 else 0.0
+    memory[rows.RUN * LANES + lane] = run
+    longest = memory[rows.LONGEST_RUN * LANES + lane]
+    memory[rows.LONGEST_RUN * LANES + lane] = max(longest, run) if counts else longest

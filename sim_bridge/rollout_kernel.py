@@ -1,0 +1,224 @@
+"""The kernel of batched rollouts: blocks of LANES vehicles, each flown to its plan's end."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lcd_flight.model import FloatArray, IntArray, SeedArray
+from sim_bridge import rows
+from sim_bridge.lane_steps import (
+    SUBSTEPS,
+    TICK_S,
+    Law,
+    advance,
+    command_rotors,
+    disturb,
+    judge,
+    look,
+    reference,
+    remember,
+)
+from sim_bridge.multirotor import Airframe
+from sim_bridge.noise import key_of
+from sim_bridge.rows import LANES, ROWS
+
+LABELS = ROWS - rows.ALIVE
+"""How many rows of a lane's memory are its result, from ALIVE on."""
+
+
+class Plans(NamedTuple):
+    """What is flown, row by row."""
+
+    order: IntArray
+    """(N,) the rows, those of like length side by side."""
+    durations_s: FloatArray
+    """(N, S)"""
+    coefficients: FloatArray
+    """(N, 4, S, 8)"""
+    knots_s: FloatArray
+    """(N, S + 1)"""
+    end_ticks: IntArray
+    """(N, S) first tick at or after each segment's end."""
+    yaws_rad: FloatArray
+    """(N,) initial heading."""
+    gaps: FloatArray
+    """(N, 2) first tick without pose, first tick with pose again."""
+    seeds: SeedArray
+    """(N,)"""
+
+
+class Disturbance(NamedTuple):
+    """What the world does to the vehicle."""
+
+    motor_noise: float
+    """rad/s"""
+    motor_decay: float
+    """exp(-t / tau) of half a Runge-Kutta step t."""
+    initial_speed: float
+    """rad/s, of every rotor."""
+
+
+class Results(NamedTuple):
+    """What comes out, row by row."""
+
+    labels: FloatArray
+    """(N, LABELS) the rows of memory from ALIVE on."""
+    segment_largest: FloatArray
+    """(N, S) squared; NaN where never reached."""
+    waypoint_errors: FloatArray
+    """(N, S + 1) m; NaN where never reached."""
+    trace: FloatArray
+    """(ticks, ROWS * LANES) the whole memory after each tick, or nothing."""
+
+
+def fly(
+    first: int, last: int, plans: Plans, air: Airframe, law: Law, disturbance: Disturbance, results: Results
+) -> None:
+    """Fly blocks `first` to `last` - 1 of LANES rows each; the last one is filled up with copies of the last row."""
+    memory = np.empty(ROWS * LANES)
+    lanes = np.empty(LANES, dtype=np.int64)
+    segments = np.empty(LANES, dtype=np.int64)
+    keys = np.empty(LANES, dtype=np.uint64)
+    for block in range(first, last):
+        for lane in range(LANES):
+            lanes[lane] = plans.order[min(block * LANES + lane, len(plans.order) - 1)]
+            segments[lane] = 0
+            keys[lane] = key_of(plans.seeds[lanes[lane]])
+            start_lane(memory, lane, lanes[lane], plans, disturbance)
+            results.waypoint_errors[lanes[lane], 0] = 0.0
+        fly_block(memory, lanes, segments, keys, plans, air, law, disturbance, results)
+        for lane in range(LANES):
+            finish_lane(memory, lane, lanes[lane], segments[lane], results)
+
+
+def start_lane(memory: FloatArray, lane: int, row: int, plans: Plans, disturbance: Disturbance) -> None:
+    """At rest on the plan's start, the rotors carrying the weight."""
+    for r in range(ROWS):
+        memory[r * LANES + lane] = 0.0
+    half_yaw = 0.5 * plans.yaws_rad[row]
+    for axis in range(3):
+        memory[(rows.MOTION + axis) * LANES + lane] = plans.coefficients[row, axis, 0, 0]
+    memory[(rows.MOTION + 8) * LANES + lane] = np.sin(half_yaw)
+    memory[(rows.MOTION + 9) * LANES + lane] = np.cos(half_yaw)
+    for rotor in range(4):
+        memory[(rows.SPEEDS + rotor) * LANES + lane] = disturbance.initial_speed
+    for r in range(13):
+        memory[(rows.SEEN + r) * LANES + lane] = memory[(rows.MOTION + r) * LANES + lane]
+    segments = plans.durations_s.shape[1]
+    memory[rows.DURATION * LANES + lane] = plans.knots_s[row, segments]
+    memory[rows.LAST_TICK * LANES + lane] = plans.end_ticks[row, segments - 1]
+    memory[rows.GAP_START * LANES + lane] = plans.gaps[row, 0]
+    memory[rows.GAP_END * LANES + lane] = plans.gaps[row, 1]
+    memory[rows.ALIVE * LANES + lane] = 1.0
+    memory[rows.SEGMENT_LARGEST * LANES + lane] = -1.0
+    load_segment(memory, lane, row, 0, plans)
+
+
+def load_segment(memory: FloatArray, lane: int, row: int, segment: int, plans: Plans) -> None:
+    """Bring a segment's polynomials into the lane."""
+    memory[rows.SEGMENT_START * LANES + lane] = plans.knots_s[row, segment]
+    for axis in range(4):
+        for k in range(8):
+            at = (rows.COEFFICIENTS + 8 * axis + k) * LANES + lane
+            memory[at] = plans.coefficients[row, axis, segment, k]
+
+
+def fly_block(
+    memory: FloatArray,
+    lanes: IntArray,
+    segments: IntArray,
+    keys: SeedArray,
+    plans: Plans,
+    air: Airframe,
+    law: Law,
+    disturbance: Disturbance,
+    results: Results,
+) -> None:
+    """Tick after tick: fly under the last command, sample the reference, judge, command."""
+    next_end = pass_knots(memory, lanes, segments, 0, plans, results)
+    tick = 0
+    while any_runs(memory, tick):
+        if tick > 0:
+            for lane in range(LANES):
+                remember(memory, lane)
+            for _ in range(SUBSTEPS):
+                for lane in range(LANES):
+                    advance(memory, lane, air, TICK_S / SUBSTEPS, disturbance.motor_decay)
+            if disturbance.motor_noise > 0.0:
+                for lane in range(LANES):
+                    disturb(memory, lane, keys[lane], np.uint64(tick), air, disturbance.motor_noise)
+        if tick >= next_end:
+            next_end = pass_knots(memory, lanes, segments, tick, plans, results)
+        for lane in range(LANES):
+            look(memory, lane, float(tick))
+            sample = reference(memory, lane, float(tick))
+            judge(memory, lane, float(tick), sample)
+            command_rotors(memory, lane, float(tick), sample, law, air)
+        if tick < len(results.trace):
+            results.trace[tick] = memory
+        tick += 1
+
+
+def any_runs(memory: FloatArray, tick: int) -> bool:
+    """Whether any lane still has something to fly."""
+    runs = False
+    for lane in range(LANES):
+        runs |= (memory[rows.ALIVE * LANES + lane] > 0.0) & (tick <= memory[rows.LAST_TICK * LANES + lane])
+    return runs
+
+
+def pass_knots(
+    memory: FloatArray, lanes: IntArray, segments: IntArray, tick: int, plans: Plans, results: Results
+) -> int:
+    """Take the lanes that reached a knot into their next segment; return the tick of the next knot of any lane."""
+    count = plans.durations_s.shape[1]
+    next_end = np.int64(1 << 62)
+    for lane in range(LANES):
+        row = lanes[lane]
+        alive = memory[rows.ALIVE * LANES + lane] > 0.0
+        while alive and segments[lane] < count and tick >= plans.end_ticks[row, segments[lane]]:
+            pass_knot(memory, lane, row, segments[lane], tick, plans, results)
+            segments[lane] += 1
+        if alive and segments[lane] < count:
+            next_end = min(next_end, plans.end_ticks[row, segments[lane]])
+    return next_end
+
+
+def pass_knot(
+    memory: FloatArray, lane: int, row: int, segment: int, tick: int, plans: Plans, results: Results
+) -> None:
+    """Note the error at the segment's end, between the last tick and this one; load the next segment."""
+    share = plans.knots_s[row, segment + 1] / TICK_S - (tick - 1)
+    total = 0.0
+    for axis in range(3):
+        target = 0.0
+        for k in range(7, -1, -1):
+            target = target * plans.durations_s[row, segment] + plans.coefficients[row, axis, segment, k]
+        total += (between(memory, lane, axis, share) - target) ** 2
+    results.waypoint_errors[row, segment + 1] = np.sqrt(total)
+    if segment + 1 < plans.durations_s.shape[1]:
+        largest = memory[rows.SEGMENT_LARGEST * LANES + lane]
+        results.segment_largest[row, segment] = largest if largest >= 0.0 else np.nan
+        memory[rows.SEGMENT_LARGEST * LANES + lane] = -1.0
+        load_segment(memory, lane, row, segment + 1, plans)
+
+
+def between(memory: FloatArray, lane: int, axis: int, share: float) -> float:
+    """A coordinate between the last tick (share 0) and this one (share 1): the cubic through both states."""
+    p0 = memory[(rows.BEFORE + axis) * LANES + lane]
+    v0 = memory[(rows.BEFORE + 3 + axis) * LANES + lane] * TICK_S
+    p1 = memory[(rows.MOTION + axis) * LANES + lane]
+    v1 = memory[(rows.MOTION + 3 + axis) * LANES + lane] * TICK_S
+    rest = 1.0 - share
+    return rest * rest * (p0 * (1.0 + 2.0 * share) + v0 * share) + share * share * (p1 * (3.0 - 2.0 * share) - v1 * rest)
+
+
+def finish_lane(memory: FloatArray, lane: int, row: int, segment: int, results: Results) -> None:
+    """Hand the labels out; segments and waypoints that were never reached stay NaN."""
+    segment = min(segment, results.segment_largest.shape[1] - 1)
+    largest = memory[rows.SEGMENT_LARGEST * LANES + lane]
+    results.segment_largest[row, segment] = largest if largest >= 0.0 else np.nan
+    for k in range(LABELS):
+        results.labels[row, k] = memory[(rows.ALIVE + k) * LANES + lane]

@@ -1,0 +1,170 @@
+"""Batched closed-loop rollouts: the simulator port, as `lcd_flight.simulators` names it."""
+
+from __future__ import annotations
+
+import math
+import os
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import lcd_flight
+from lcd_flight.control.geometric import Allocation
+from lcd_flight.jit import Compiler
+from lcd_flight.model import FloatArray, InputError, RolloutLabels, RolloutOptions, SeedArray, Trajectories, Vehicle
+from sim_bridge import rollout_kernel, rows
+from sim_bridge.lane_steps import SUBSTEPS, TICK_S, Law
+from sim_bridge.multirotor import airframe
+from sim_bridge.rollout_kernel import LABELS, Disturbance, Plans, Results
+from sim_bridge.rows import LANES
+
+_BLOCKS_AT_A_TIME = 4
+"""Handed to a thread in one call: small enough to share evenly and to be interrupted soon."""
+
+
+class MultirotorSimulator:
+    """RotorPy's multirotor model under the geometric law, compiled, many vehicles side by side."""
+
+    def rollout(
+        self, plans: Trajectories, vehicle: Vehicle, seeds: SeedArray, options: RolloutOptions
+    ) -> RolloutLabels:
+        """Fly every plan once; a row's labels depend on that row alone.
+
+        plans: N. seeds: (N,) of the motor noise.
+
+        Raises:
+            InputError: a plan that is not finite, a controller or loop that this simulator does not know.
+        """
+        return labels_of(_fly(plans, vehicle, seeds, options, ticks=0))
+
+
+def _fly(plans: Trajectories, vehicle: Vehicle, seeds: SeedArray, options: RolloutOptions, ticks: int) -> Results:
+    """Run the kernel over all rows; record the memory of the first `ticks` ticks."""
+    prepared = _prepare(plans, seeds, options)
+    count, segments = plans.durations_s.shape
+    results = Results(
+        labels=np.empty((count, LABELS)),
+        segment_largest=np.full((count, segments), np.nan),
+        waypoint_errors=np.full((count, segments + 1), np.nan),
+        trace=np.empty((ticks, rows.ROWS * LANES)),
+    )
+    disturbance = Disturbance(
+        motor_noise=vehicle.motor_noise,
+        motor_decay=math.exp(-0.5 * TICK_S / SUBSTEPS / vehicle.motor_time_constant_s),
+        initial_speed=vehicle.hover_rotor_speed,
+    )
+    arguments = (prepared, airframe(vehicle), law_of(options.nominal or vehicle), disturbance, results)
+    _over_blocks(-(-count // LANES), options.threads or os.cpu_count() or 1, arguments)
+    return results
+
+
+def _over_blocks(blocks: int, threads: int, arguments: tuple[Any, ...]) -> None:
+    """Share the blocks among threads; the kernel holds no lock."""
+    kernel = _kernel()
+    starts = range(0, blocks, _BLOCKS_AT_A_TIME)
+    if threads == 1 or len(starts) <= 1:
+        for start in starts:
+            kernel(start, min(start + _BLOCKS_AT_A_TIME, blocks), *arguments)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        work = [pool.submit(kernel, s, min(s + _BLOCKS_AT_A_TIME, blocks), *arguments) for s in starts]
+        try:
+            for part in work:
+                part.result()
+        except BaseException:
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
+
+
+def _prepare(plans: Trajectories, seeds: SeedArray, options: RolloutOptions) -> Plans:
+    """The kernel's view of a batch."""
+    durations = np.ascontiguousarray(plans.durations_s, dtype=np.float64)
+    coefficients = np.ascontiguousarray(plans.coefficients, dtype=np.float64)
+    _check(durations, coefficients, seeds, options)
+    knots = np.concatenate([np.zeros((len(durations), 1)), np.cumsum(durations, axis=1)], axis=1)
+    end_ticks = np.ceil(knots[:, 1:] / TICK_S - 1e-9).astype(np.int64)
+    yaws = coefficients[:, 3, 0, 0] if options.start_aligned else np.zeros(len(durations))
+    gaps = np.zeros((len(durations), 2))
+    if options.pose_gap_ticks is not None:
+        gaps[:] = options.pose_gap_ticks
+        gaps[:, 1] += gaps[:, 0]
+    return Plans(
+        order=np.argsort(end_ticks[:, -1], kind="stable"),
+        durations_s=durations,
+        coefficients=coefficients,
+        knots_s=knots,
+        end_ticks=end_ticks,
+        yaws_rad=np.ascontiguousarray(yaws),
+        gaps=gaps,
+        seeds=np.ascontiguousarray(seeds, dtype=np.uint64),
+    )
+
+
+def _check(durations: FloatArray, coefficients: FloatArray, seeds: SeedArray, options: RolloutOptions) -> None:
+    """Refuse what cannot be flown."""
+    if options.controller != "geometric":
+        raise InputError(f"controller {options.controller!r} is not known to the simulator; it has: geometric")
+    if len(seeds) != len(durations):
+        raise InputError(f"{len(durations)} plans need as many seeds, got {len(seeds)}")
+    if not (np.isfinite(coefficients).all() and np.isfinite(durations).all() and (durations > 0.0).all()):
+        raise InputError("a plan has durations that are not positive or coefficients that are not finite")
+
+
+def law_of(vehicle: Vehicle) -> Law:
+    """The paper's loop as tuned for a vehicle."""
+    x, y, _ = np.array(vehicle.rotor_positions_m).T
+    ratio = vehicle.k_m / vehicle.k_eta
+    matrix = np.array([np.ones(4), y, -x, ratio * np.array(vehicle.rotor_directions)])
+    inverse = tuple(tuple(map(float, row)) for row in np.linalg.inv(matrix))
+    gains = vehicle.gains
+    return Law(
+        mass_kg=vehicle.mass_kg,
+        inertia_kg_m2=vehicle.inertia_kg_m2,
+        position_gain=gains.position,
+        velocity_gain=gains.velocity,
+        attitude_gain=gains.attitude,
+        rate_gain=gains.body_rates,
+        allocation=Allocation(inverse, vehicle.k_eta),  # type: ignore[arg-type]
+    )
+
+
+def labels_of(results: Results) -> RolloutLabels:
+    """The port's labels from the kernel's sums."""
+    sums = dict(zip(_LABEL_ROWS, results.labels.T, strict=True))
+    samples = np.maximum(sums[rows.SAMPLES], 1.0)
+    return RolloutLabels(
+        max_error_m=np.sqrt(sums[rows.LARGEST]),
+        max_error_time_s=sums[rows.LARGEST_TICK] * TICK_S,
+        mean_error_m=sums[rows.SUM] / samples,
+        rms_error_m=np.sqrt(sums[rows.SUM_2] / samples),
+        p8_error_m=(sums[rows.SUM_8] / samples) ** 0.125,
+        segment_max_error_m=np.sqrt(results.segment_largest),
+        waypoint_error_m=results.waypoint_errors,
+        yaw_cost=sums[rows.YAW_COST] / samples,
+        paper_cost=sums[rows.PAPER_COST],
+        released_cost=sums[rows.RELEASED_COST],
+        saturation_share=sums[rows.CLIPPED] / (4.0 * samples),
+        longest_saturation_s=sums[rows.LONGEST_RUN] * TICK_S,
+        valid=sums[rows.ALIVE] > 0.0,
+    )
+
+
+_LABEL_ROWS = range(rows.ALIVE, rows.ROWS)
+
+
+@cache
+def _kernel() -> Any:
+    """The compiled kernel; its machine code is kept on disk until any source that goes into it changes."""
+    house = Path(lcd_flight.__file__).parent
+    sources = Compiler(
+        Path(__file__).parent,
+        house / "control",
+        house / "model",
+        error_model="numpy",
+        nogil=True,
+        fastmath={"contract", "nsz", "arcp"},
+    )
+    return sources.kernel(rollout_kernel.fly)

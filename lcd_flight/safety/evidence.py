@@ -1,0 +1,156 @@
+"""What the monitors look at in one tick, and what they remember from the ticks before."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from enum import IntEnum
+
+from lcd_flight.model import Quaternion, RawPose, State, Telemetry, TickInputs
+from lcd_flight.model.frames import angle_between
+
+SATURATION_TICKS = 50
+"""Window of the saturation share: 0.5 s."""
+SKIPPED_TICKS = 100
+"""Window of the share of skipped ticks: 1 s."""
+FROZEN_FRAMES = 3
+"""So many equal frames while the vehicle turns are a frozen source."""
+FROZEN_TURN_RAD = math.radians(1.0)
+
+
+class Scope(IntEnum):
+    """When a monitor is judged; each includes the ones after it."""
+
+    ALWAYS = 0
+    ARMED = 1
+    """From arming on."""
+    AIRBORNE = 2
+
+
+@dataclass(frozen=True, slots=True)
+class SafetyMemory:
+    """What judging a tick needs from the ticks before."""
+
+    since_ns: tuple[int | None, ...] = ()
+    """For each monitor, since when its limit has been exceeded without a break."""
+    saturated: int = 0
+    """One bit a tick, the newest lowest."""
+    skipped: int = 0
+    """One bit a deadline: 1 where its tick was skipped."""
+    rejected: int = 0
+    """The pose source's counter at the tick before."""
+    seen_ns: int | None = None
+    """Arrival of the newest pose that could be used."""
+    distinct: RawPose | None = None
+    """The first of the newest run of equal frames."""
+    distinct_q_WB: Quaternion | None = None
+    """Onboard attitude when it came."""
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """All that the monitors may look at."""
+
+    now_ns: int
+    scope: Scope
+    lateness_s: float
+    """Of this tick against its deadline."""
+    skipped_share: float
+    """Of the deadlines of the last second."""
+    pose_gap_s: float
+    """Since the newest pose that could be used; infinite before the first."""
+    pose_rate_hz: float
+    rejected: int
+    """Frames since the tick before."""
+    reject_reason: str
+    link_age_s: float
+    """Since the vehicle's newest packet; infinite before the first."""
+    disconnected: bool
+    loss_share: float
+    telemetry: Telemetry | None
+    state: State | None
+    """Measured, or predicted over a gap."""
+    position_error_m: float | None
+    saturation_share: float
+    """Of the ticks of the last 0.5 s."""
+    invalid_commands: int
+    """Control steps in a row, up to the tick before, whose result was not finite."""
+
+
+def pose_seen(inputs: TickInputs, memory: SafetyMemory) -> tuple[bool, SafetyMemory]:
+    """Whether this tick's pose can be used: valid, finite and not frozen; and the memory with it noted.
+
+    Frozen means: the same pose in three frames or more while the vehicle reports that it turns.
+    """
+    pose, memory = inputs.pose, _distinct_noted(inputs, memory)
+    if pose.state is None or pose.age_ns is None or not _is_finite(pose.state) or _is_frozen(inputs, memory):
+        return False, memory
+    return True, replace(memory, seen_ns=inputs.now_ns - pose.age_ns)
+
+
+def gather(
+    inputs: TickInputs,
+    memory: SafetyMemory,
+    *,
+    scope: Scope,
+    state: State | None,
+    position_error_m: float | None,
+    saturated: bool,
+    invalid_commands: int,
+) -> tuple[Evidence, SafetyMemory]:
+    """The evidence of one tick and the memory that goes with it.
+
+    memory: from `pose_seen`. saturated: whether the setpoint before this tick was at a limit.
+    """
+    slots = inputs.missed + 1
+    saturation = _pushed(memory.saturated, saturated, slots, SATURATION_TICKS)
+    skipped = _pushed(_pushed(memory.skipped, True, inputs.missed, SKIPPED_TICKS), False, 1, SKIPPED_TICKS)
+    link = inputs.link
+    evidence = Evidence(
+        now_ns=inputs.now_ns,
+        scope=scope,
+        lateness_s=(inputs.now_ns - inputs.deadline_ns) * 1e-9,
+        skipped_share=skipped.bit_count() / SKIPPED_TICKS,
+        pose_gap_s=math.inf if memory.seen_ns is None else (inputs.now_ns - memory.seen_ns) * 1e-9,
+        pose_rate_hz=inputs.pose.rate_hz,
+        rejected=max(inputs.pose.rejected - memory.rejected, 0),
+        reject_reason=inputs.pose.reject_reason,
+        link_age_s=math.inf if link.age_ns is None else link.age_ns * 1e-9,
+        disconnected=not link.connected,
+        loss_share=link.loss_share,
+        telemetry=link.telemetry,
+        state=state,
+        position_error_m=position_error_m,
+        saturation_share=saturation.bit_count() / SATURATION_TICKS,
+        invalid_commands=invalid_commands,
+    )
+    return evidence, replace(memory, saturated=saturation, skipped=skipped, rejected=inputs.pose.rejected)
+
+
+def _pushed(bits: int, value: bool, count: int, size: int) -> int:
+    """A window of bits moved on by `count` slots that all hold `value`."""
+    count = min(count, size)
+    return ((bits << count) | ((1 << count) - 1) * value) & ((1 << size) - 1)
+
+
+def _is_finite(state: State) -> bool:
+    return all(map(math.isfinite, (*state.p_WB, *state.v_WB_W, *state.q_WB, *state.w_WB_B)))
+
+
+def _distinct_noted(inputs: TickInputs, memory: SafetyMemory) -> SafetyMemory:
+    raw, before = inputs.pose.raw, memory.distinct
+    if raw is None or (before is not None and raw.p_WB == before.p_WB and raw.q_WB == before.q_WB):
+        return memory
+    return replace(memory, distinct=raw, distinct_q_WB=_onboard_attitude(inputs))
+
+
+def _is_frozen(inputs: TickInputs, memory: SafetyMemory) -> bool:
+    raw, first, then, now = inputs.pose.raw, memory.distinct, memory.distinct_q_WB, _onboard_attitude(inputs)
+    if raw is None or first is None or then is None or now is None:
+        return False
+    return raw.sequence - first.sequence >= FROZEN_FRAMES - 1 and angle_between(then, now) > FROZEN_TURN_RAD
+
+
+def _onboard_attitude(inputs: TickInputs) -> Quaternion | None:
+    telemetry = inputs.link.telemetry
+    return None if telemetry is None else telemetry.q_WB

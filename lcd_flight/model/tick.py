@@ -18,8 +18,12 @@ from lcd_flight.model.types import Vector3
 class Command(StrEnum):
     """What the operator or the flight manager may ask of the tick."""
 
+    CHECK = "check"
+    """Begin the pre-flight."""
+    CHECKED = "checked"
+    """The pre-flight passed."""
     ARM = "arm"
-    """Pre-flight passed and the operator agreed."""
+    """The operator agreed."""
     TAKEOFF = "takeoff"
     RESUME = "resume"
     """Go on from BRAKE_HOLD."""
@@ -61,7 +65,7 @@ class Tick:
     sequence: int
     now_ns: int
     dt_s: float
-    """Measured, since the tick before."""
+    """Measured, since the tick before; what the step counted with, so at most 50 ms."""
     phase: Phase
     leg: int
     """Index into the plan's legs; -1 before take-off."""

@@ -1,0 +1,37 @@
+"""The state that a tick counts with: measured, or predicted over a short gap in the pose. Pure."""
+
+from __future__ import annotations
+
+from lcd_flight.flight.setup import FlightSetup, Memory
+from lcd_flight.model import GRAVITY_M_PER_S2, AttitudeThrust, State, TickInputs, Vehicle
+from lcd_flight.model.frames import body_z_axis
+from lcd_flight.safety.evidence import SafetyMemory, pose_seen
+
+
+def estimate(inputs: TickInputs, setup: FlightSetup, memory: Memory, dt_s: float) -> tuple[State | None, SafetyMemory]:
+    """The state now, None once the pose has been away for `pose_timeout_s`; and the memory of what was seen."""
+    usable, safety = pose_seen(inputs, memory.safety)
+    if usable:
+        return inputs.pose.state, safety
+    if safety.seen_ns is None or memory.state is None:
+        return None, safety
+    if (inputs.now_ns - safety.seen_ns) * 1e-9 > setup.limits.pose_timeout_s:
+        return None, safety
+    if memory.setpoint is None or not memory.phase.airborne:
+        return memory.state, safety
+    return predicted(memory.state, memory.setpoint, setup.vehicle, dt_s), safety
+
+
+def predicted(state: State, setpoint: AttitudeThrust, vehicle: Vehicle, dt_s: float) -> State:
+    """The state one step later, of a vehicle that has the attitude and the thrust that it was told; no drag."""
+    x, y, z = body_z_axis(setpoint.q_WB)
+    specific = setpoint.thrust_N / vehicle.mass_kg
+    ax, ay, az = specific * x, specific * y, specific * z - GRAVITY_M_PER_S2
+    (px, py, pz), (vx, vy, vz) = state.p_WB, state.v_WB_W
+    half = 0.5 * dt_s
+    return State(
+        p_WB=(px + dt_s * (vx + half * ax), py + dt_s * (vy + half * ay), pz + dt_s * (vz + half * az)),
+        v_WB_W=(vx + dt_s * ax, vy + dt_s * ay, vz + dt_s * az),
+        q_WB=setpoint.q_WB,
+        w_WB_B=(0.0, 0.0, 0.0),
+    )

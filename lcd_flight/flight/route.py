@@ -1,0 +1,125 @@
+"""What is flown next: legs in order, waits to settle, touchdown, and the manoeuvre of each abnormal phase. Pure."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from lcd_flight.flight.manoeuvres import go_to, land_from, stop
+from lcd_flight.flight.phases import OF_LEG, Event
+from lcd_flight.flight.setup import FlightSetup, Route
+from lcd_flight.model import Finding, Leg, Phase, Reference, Severity, State, Vector3
+
+SMOOTHING_S = 0.2
+"""Time constant of the velocity that settling and touchdown are judged by."""
+STILL_SPEED = 0.1
+"""m/s"""
+CALM_ERROR_M = 0.1
+SETTLED_S = 0.5
+"""Calm for so long is settled."""
+SETTLE_LIMIT_S = 5.0
+"""A leg that has not settled by then is left with a warning."""
+TOUCHDOWN_S = 0.3
+"""Standing for so long although told to go down is touchdown."""
+TOUCHDOWN_DEPTH_M = 0.15
+"""How far the reference must be below a vehicle that stands."""
+BLIND_TOUCHDOWN_M = 0.1
+"""Height above the ground below which a vehicle that stands has landed, in a descent without reference."""
+
+ON_THE_WAY = frozenset({Phase.TAKEOFF, Phase.HOLD, Phase.TRACK})
+
+
+def moved_on(route: Route, state: State | None, dt_s: float) -> tuple[Route, Reference | None]:
+    """The route one step later, and where the vehicle should be now; None where nothing is followed."""
+    time_s = route.path_time_s + dt_s
+    reference = None if route.path is None else route.path.reference(time_s)
+    v_smooth_W = _smoothed(route.v_smooth_W, state, dt_s)
+    still = state is not None and math.hypot(*v_smooth_W) < STILL_SPEED
+    near = state is not None and reference is not None and math.dist(state.p_WB, reference.p_W) < CALM_ERROR_M
+    moved = Route(
+        leg=route.leg,
+        leg_time_s=route.leg_time_s + dt_s if route.on_leg else route.leg_time_s,
+        path=route.path,
+        path_time_s=time_s,
+        on_leg=route.on_leg,
+        calm_s=route.calm_s + dt_s if still and near else 0.0,
+        still_s=route.still_s + dt_s if still else 0.0,
+        v_smooth_W=v_smooth_W,
+    )
+    return moved, reference
+
+
+def next_leg(route: Route, setup: FlightSetup, phase: Phase) -> tuple[Event | None, tuple[Finding, ...]]:
+    """How the next leg begins, once the path is flown and, where that is asked for, the vehicle has settled."""
+    if phase not in ON_THE_WAY or route.path is None:
+        return None, ()
+    over_s = route.path_time_s - route.path.duration_s
+    if over_s < 0.0:
+        return None, ()
+    findings: tuple[Finding, ...] = ()
+    if _settles(route, setup) and route.calm_s < SETTLED_S:
+        if over_s < SETTLE_LIMIT_S:
+            return None, ()
+        text = f"not settled after {SETTLE_LIMIT_S:g} s at the end of leg {route.leg}; going on"
+        findings = (Finding("not_settled", Severity.WARN, text, over_s, SETTLE_LIMIT_S),)
+    following = _leg(setup, route.leg + 1)
+    return Event.LAND if following is None else OF_LEG[following.kind], findings
+
+
+def touched_down(
+    route: Route, setup: FlightSetup, phase: Phase, state: State | None, reference: Reference | None
+) -> bool:
+    """Whether the vehicle stands although it is told to go down."""
+    if state is None or route.still_s < TOUCHDOWN_S:
+        return False
+    if phase in (Phase.LAND, Phase.LAND_NOW):
+        return reference is not None and state.p_WB[2] - reference.p_W[2] > TOUCHDOWN_DEPTH_M
+    return phase is Phase.DESCEND_BLIND and state.p_WB[2] - setup.ground_z_m < BLIND_TOUCHDOWN_M
+
+
+def begun(route: Route, setup: FlightSetup, before: Phase, phase: Phase, state: State) -> Route:
+    """The route as a phase is entered, or as the next leg begins; call it only then."""
+    if before in (Phase.ARMED, *ON_THE_WAY) and phase in (Phase.LAND, *ON_THE_WAY):
+        return _leg_begun(route, setup)
+    if phase is Phase.BRAKE_HOLD:
+        return replace(route, path=stop(state), path_time_s=0.0, on_leg=False)
+    if phase is Phase.LAND_NOW:
+        return replace(route, path=land_from(state, setup.lowest_z_m), path_time_s=0.0, on_leg=False)
+    if phase is Phase.HOLD:
+        return _way_back(route, setup, state)
+    return replace(route, path=None, path_time_s=0.0, on_leg=False, still_s=0.0)
+
+
+def _leg_begun(route: Route, setup: FlightSetup) -> Route:
+    """The next leg from its start; time flown beyond a leg that needed no settling counts for the next."""
+    waited = route.path is None or _settles(route, setup)
+    begin_s = 0.0 if waited or route.path is None else route.path_time_s - route.path.duration_s
+    leg = route.leg + 1
+    return replace(
+        route, leg=leg, leg_time_s=begin_s, path=setup.paths[leg], path_time_s=begin_s, on_leg=True, calm_s=0.0
+    )
+
+
+def _way_back(route: Route, setup: FlightSetup, state: State) -> Route:
+    """To where the interrupted leg begins (a take-off: ends), so that it can be flown again from rest."""
+    leg = max(route.leg - 1, 0)
+    ended = setup.plan.legs[leg].trajectory
+    path = go_to(state, ended.waypoints()[-1])
+    return replace(route, leg=leg, leg_time_s=ended.duration_s, path=path, path_time_s=0.0, on_leg=False, calm_s=0.0)
+
+
+def _settles(route: Route, setup: FlightSetup) -> bool:
+    leg = _leg(setup, route.leg)
+    return not route.on_leg or leg is None or leg.settle
+
+
+def _leg(setup: FlightSetup, index: int) -> Leg | None:
+    return setup.plan.legs[index] if 0 <= index < len(setup.plan.legs) else None
+
+
+def _smoothed(v_W: Vector3, state: State | None, dt_s: float) -> Vector3:
+    if state is None:
+        return v_W
+    share = dt_s / (SMOOTHING_S + dt_s)
+    x, y, z = (old + share * (new - old) for old, new in zip(v_W, state.v_WB_W, strict=True))
+    return (x, y, z)

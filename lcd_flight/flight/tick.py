@@ -1,0 +1,186 @@
+"""One control step, pure: what is known goes in, what is sent, judged and logged comes out.
+
+In this order: estimate the state, move along the route, judge, let the phase follow, begin what it asks for, steer.
+A fault that is seen in a tick decides that tick's setpoint.
+"""
+
+from __future__ import annotations
+
+import math
+
+from lcd_flight.flight.estimate import estimate
+from lcd_flight.flight.manoeuvres import blind_time_s
+from lcd_flight.flight.phases import OF_COMMAND, OF_SEVERITY, TIME_LIMITS_S, Event, advance
+from lcd_flight.flight.route import begun, moved_on, next_leg, touched_down
+from lcd_flight.flight.setup import PERIOD_NS, FlightSetup, Memory, Route
+from lcd_flight.flight.steering import Steering, saturated, steer
+from lcd_flight.model import (
+    Command,
+    Finding,
+    MotorRequest,
+    Phase,
+    Reference,
+    Severity,
+    State,
+    Tick,
+    TickInputs,
+    Vector3,
+)
+from lcd_flight.safety.evidence import SafetyMemory, Scope, gather
+from lcd_flight.safety.monitors import VEHICLE_CRASHED, judge
+
+MAX_STEP_S = 0.05
+"""A longer pause moves the plan on by this much only: the vehicle did not fly it either."""
+
+EXPIRED = "phase_expired"
+
+_OF_CODE = {EXPIRED: Event.EXPIRED, VEHICLE_CRASHED: Event.CRASHED}
+"""Findings that lead to an event of their own, whatever their severity."""
+
+_ORDERS = {
+    Command.LAND: Finding("operator_land", Severity.LAND, "the operator asked to land"),
+    Command.DESCEND: Finding("operator_descend", Severity.DESCEND, "the operator asked to descend level"),
+    Command.STOP_MOTORS: Finding("operator_stop", Severity.KILL, "the operator stopped the motors"),
+}
+
+
+def tick(inputs: TickInputs, setup: FlightSetup, memory: Memory) -> tuple[Tick, Memory]:
+    """Decide one control step. Equal arguments give equal results, to the bit."""
+    dt_s = _step_s(inputs, memory)
+    state, safety = estimate(inputs, setup, memory, dt_s)
+    route, reference = moved_on(memory.route, state, dt_s)
+    judged, safety = _judged(inputs, setup, memory, safety, state, reference)
+    leg_event, waits = next_leg(route, setup, memory.phase)
+    findings = (*judged, *waits, *_orders(inputs), *_expiry(inputs, memory))
+    events = _events(inputs, findings)
+    if leg_event is not None:
+        events.append(leg_event)
+    if touched_down(route, setup, memory.phase, state, reference):
+        events.append(Event.TOUCHDOWN)
+    phase = advance(memory.phase, events)
+    known = state or memory.state
+    if known is not None and (phase is not memory.phase or leg_event is not None):
+        route = begun(route, setup, memory.phase, phase, known)
+        reference = None if route.path is None else route.path.reference(route.path_time_s)
+    steering = steer(phase, state, reference, setup, memory, dt_s)
+    limited = saturated(steering.setpoint, inputs, setup)
+    decided = Tick(
+        sequence=inputs.sequence,
+        now_ns=inputs.now_ns,
+        dt_s=dt_s,
+        phase=phase,
+        leg=route.leg,
+        leg_time_s=route.leg_time_s,
+        reference=reference,
+        setpoint=steering.setpoint,
+        motors=_motors(memory.phase, phase),
+        position_error_W=_error(state, reference),
+        saturated=limited,
+        findings=(*findings, *steering.findings),
+    )
+    return decided, _remembered(decided, memory, known, route, safety, steering, setup)
+
+
+def _step_s(inputs: TickInputs, memory: Memory) -> float:
+    if memory.now_ns is None:
+        return PERIOD_NS * 1e-9
+    return min(max((inputs.now_ns - memory.now_ns) * 1e-9, 0.0), MAX_STEP_S)
+
+
+def _judged(
+    inputs: TickInputs,
+    setup: FlightSetup,
+    memory: Memory,
+    safety: SafetyMemory,
+    state: State | None,
+    reference: Reference | None,
+) -> tuple[tuple[Finding, ...], SafetyMemory]:
+    """What the monitors find, in the phase that the tick before left behind."""
+    error_W = _error(state, reference)
+    evidence, safety = gather(
+        inputs,
+        safety,
+        scope=_scope(memory.phase),
+        state=state,
+        position_error_m=None if error_W is None else math.hypot(*error_W),
+        saturated=memory.saturated,
+        invalid_commands=memory.invalid_commands,
+    )
+    return judge(setup.monitors, evidence, safety)
+
+
+def _scope(phase: Phase) -> Scope:
+    if phase.airborne:
+        return Scope.AIRBORNE
+    return Scope.ARMED if phase is Phase.ARMED else Scope.ALWAYS
+
+
+def _orders(inputs: TickInputs) -> tuple[Finding, ...]:
+    return tuple(_ORDERS[command] for command in inputs.commands if command in _ORDERS)
+
+
+def _expiry(inputs: TickInputs, memory: Memory) -> tuple[Finding, ...]:
+    """A finding once the phase has lasted as long as it may."""
+    limit_s = memory.blind_s if memory.phase is Phase.DESCEND_BLIND else TIME_LIMITS_S.get(memory.phase)
+    lasted_s = (inputs.now_ns - memory.phase_since_ns) * 1e-9
+    if limit_s is None or lasted_s <= limit_s:
+        return ()
+    return (Finding(EXPIRED, Severity.WARN, f"{memory.phase} has lasted {limit_s:.1f} s", lasted_s, limit_s),)
+
+
+def _events(inputs: TickInputs, findings: tuple[Finding, ...]) -> list[Event]:
+    """What commands and findings ask for."""
+    events = [OF_COMMAND[command] for command in inputs.commands if command in OF_COMMAND]
+    for finding in findings:
+        if finding.code in _OF_CODE:
+            events.append(_OF_CODE[finding.code])
+        elif finding.severity in OF_SEVERITY:
+            events.append(OF_SEVERITY[finding.severity])
+    return events
+
+
+def _motors(before: Phase, phase: Phase) -> MotorRequest:
+    """What the link is asked for: a stop is repeated for as long as it holds, the rest is asked for once."""
+    if phase is Phase.KILL or (phase is Phase.CRASHED and before.airborne):
+        return MotorRequest.STOP
+    if phase is before:
+        return MotorRequest.NONE
+    if phase is Phase.ARMED:
+        return MotorRequest.ARM
+    on_ground = phase in (Phase.LANDED, Phase.IDLE, Phase.CRASHED)
+    return MotorRequest.DISARM if on_ground and (before.airborne or before is Phase.ARMED) else MotorRequest.NONE
+
+
+def _error(state: State | None, reference: Reference | None) -> Vector3 | None:
+    if state is None or reference is None:
+        return None
+    (x, y, z), (rx, ry, rz) = state.p_WB, reference.p_W
+    return (x - rx, y - ry, z - rz)
+
+
+def _remembered(
+    decided: Tick,
+    memory: Memory,
+    state: State | None,
+    route: Route,
+    safety: SafetyMemory,
+    steering: Steering,
+    setup: FlightSetup,
+) -> Memory:
+    entered = decided.phase is not memory.phase
+    blind_s = memory.blind_s
+    if entered and decided.phase is Phase.DESCEND_BLIND and state is not None:
+        blind_s = blind_time_s(state.p_WB[2] - setup.ground_z_m, state.v_WB_W[2])
+    return Memory(
+        phase=decided.phase,
+        phase_since_ns=decided.now_ns if entered else memory.phase_since_ns,
+        now_ns=decided.now_ns,
+        state=state,
+        setpoint=decided.setpoint,
+        integral=steering.integral,
+        invalid_commands=steering.invalid_commands,
+        saturated=decided.saturated,
+        blind_s=blind_s,
+        route=route,
+        safety=safety,
+    )

@@ -32,6 +32,8 @@ class Leg:
     """Whether the next leg waits at this one's end until the vehicle has settled."""
     baseline: Trajectory | None = None
     """The minimum-snap plan through the same waypoints, for comparison in the review."""
+    item: int | None = None
+    """Which item of the mission's plan it serves, from 0; None where it was not made from a mission."""
 
     @property
     def duration_s(self) -> float:

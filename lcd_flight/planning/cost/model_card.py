@@ -1,0 +1,36 @@
+"""What a model of the tracking cost is good for and where it comes from: the card inside every model file."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+
+from lcd_flight.model import Loop, Vector3
+
+
+class ModelCard(BaseModel):
+    """Written by training, read wherever the model is used."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str = Field(min_length=1)
+    vehicle: str
+    """The vehicle's name, for messages."""
+    vehicle_fingerprint: str
+    """Of all that matters about the vehicle (`lcd_flight.worlds`); what a mission's vehicle is compared with."""
+    loop: Loop
+    world: str
+    world_version: int
+    parasitic_drag: tuple[Vector3, ...]
+    """c_D in N/(m/s)^2 of each drag configuration in the data."""
+    speed: FiniteFloat
+    """m/s of the tasks in the data."""
+    rollouts: int
+    """How many it was trained on."""
+    data_hash: str
+    """Of the configuration of the data and the training."""
+    snap_weight: FiniteFloat
+    """The planner's weight of the extra snap that suits this model."""
+    validation: dict[str, FiniteFloat]
+    """Figures on tasks that were held out, by name."""
+    versions: dict[str, str]
+    """Of the packages that made it."""

@@ -1,0 +1,106 @@
+"""An ensemble of small fully connected networks, forward and backward: matrix products and nothing else.
+
+The members are stacked, so that one call serves all of them. The arithmetic is that of the weights: float32 for
+planning, float64 where a test wants the last digit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+Activation: TypeAlias = Literal["silu", "elu", "relu"]
+ACTIVATIONS: tuple[Activation, ...] = get_args(Activation)
+Array: TypeAlias = NDArray[np.floating[Any]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Layer:
+    """One layer of every member.
+
+    weights: (M, inputs, outputs); biases: (M, 1, outputs).
+    """
+
+    weights: Array
+    biases: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tape:
+    """What a backward pass needs of the forward pass: the slopes of each hidden layer's activation."""
+
+    slopes: tuple[Array, ...]
+    """(M, B, width) for each hidden layer."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Network:
+    """M networks with one output each; every layer but the last is followed by the activation."""
+
+    layers: tuple[Layer, ...]
+    activation: Activation
+
+    @staticmethod
+    def of(weights: Sequence[Array], biases: Sequence[Array], activation: Activation) -> Network:
+        """From weights (M, inputs, outputs) and biases (M, outputs), input layer first; the last has one output."""
+        layers = [Layer(np.ascontiguousarray(w), b[:, None, :]) for w, b in zip(weights, biases, strict=True)]
+        return Network(tuple(layers), activation)
+
+    @property
+    def members(self) -> int:
+        """How many networks there are."""
+        return int(self.layers[0].weights.shape[0])
+
+    @property
+    def inputs(self) -> int:
+        """How many inputs they take."""
+        return int(self.layers[0].weights.shape[1])
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Of the weights, and so of all arithmetic."""
+        return self.layers[0].weights.dtype
+
+    def astype(self, dtype: type[np.floating[Any]]) -> Network:
+        """The same networks in another precision."""
+        layers = [Layer(layer.weights.astype(dtype), layer.biases.astype(dtype)) for layer in self.layers]
+        return Network(tuple(layers), self.activation)
+
+    def forward(self, inputs: Array) -> tuple[Array, Tape]:
+        """Outputs (M, B) for inputs (B, inputs), and what `backward` needs."""
+        x = np.asarray(inputs, dtype=self.dtype)
+        slopes = []
+        for layer in self.layers[:-1]:
+            x, slope = activate(_affine(x, layer), self.activation)
+            slopes.append(slope)
+        return _affine(x, self.layers[-1])[..., 0], Tape(tuple(slopes))
+
+    def backward(self, tape: Tape, grad_outputs: Array) -> Array:
+        """From a function's gradient by the outputs (M, B) to its gradient by the inputs (B, inputs)."""
+        grad = np.asarray(grad_outputs, dtype=self.dtype)[..., None] * self.layers[-1].weights[:, None, :, 0]
+        for layer, slope in zip(reversed(self.layers[:-1]), reversed(tape.slopes), strict=True):
+            grad *= slope
+            grad = grad @ layer.weights.transpose(0, 2, 1)
+        return np.asarray(grad.sum(axis=0))
+
+
+def _affine(x: Array, layer: Layer) -> Array:
+    y = x @ layer.weights
+    y += layer.biases
+    return y
+
+
+def activate(x: Array, activation: Activation) -> tuple[Array, Array]:
+    """The activation of `x` and its slope there."""
+    if activation == "silu":
+        share = 0.5 + 0.5 * np.tanh(0.5 * x)  # the logistic function, without overflow
+        value = x * share
+        return value, share + value * (1.0 - share)
+    if activation == "elu":
+        decay = np.exp(np.minimum(x, 0.0))
+        return np.maximum(x, 0.0) + (decay - 1.0), decay
+    return np.maximum(x, 0.0), (x > 0.0).astype(x.dtype)

@@ -1,0 +1,168 @@
+"""The learned tracking cost: how far a vehicle will stray from a plan, and the gradient of that.
+
+    features of each segment -> normalised -> window (previous, this, next segment, 2 flags) -> members of an ensemble
+    -> log of each segment's largest error -> logsumexp over segments -> mean + 1 standard deviation over members
+
+The logsumexp (sharpness 3) is the smooth maximum that makes a segment's error the plan's; the standard deviation is
+the pessimism that keeps a planner from where the members disagree, which is where there were no data.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lcd_flight.model import FloatArray
+from lcd_flight.planning.cost.features import FEATURE_NAMES, segment_features, segment_features_pullback
+from lcd_flight.planning.cost.network import Array, Network
+
+if TYPE_CHECKING:
+    from lcd_flight.planning.cost.model_card import ModelCard
+
+SHARPNESS = 3.0
+"""beta of the smooth maximum over segments, (1 / beta) log sum exp(beta y)."""
+PESSIMISM = 1.0
+"""Standard deviations over members that count on top of their mean."""
+
+_BATCH_WINDOWS = 512
+"""Windows that go through the networks at once: enough for fast products, few enough to stay in cache."""
+_STD_FLOOR_SQUARED = 1e-12
+"""Below the root of the variance over members, so that its gradient exists where they agree."""
+
+
+def windows(normalised: Array) -> Array:
+    """Each segment between its neighbours: (N, S, F) -> (N, S, 3 F + 2).
+
+    Previous, this and next segment, zeros where there is none, then 1 in a plan's first segment and 1 in its last.
+    """
+    tasks, segments, width = normalised.shape
+    out = np.zeros((tasks, segments, 3 * width + 2), dtype=normalised.dtype)
+    out[:, 1:, :width] = normalised[:, :-1]
+    out[:, :, width : 2 * width] = normalised
+    out[:, :-1, 2 * width : 3 * width] = normalised[:, 1:]
+    out[:, 0, 3 * width] = 1.0
+    out[:, -1, 3 * width + 1] = 1.0
+    return out
+
+
+def windows_pullback(grad_windows: Array) -> Array:
+    """Reverse mode of `windows`: (N, S, 3 F + 2) -> (N, S, F)."""
+    width = (grad_windows.shape[2] - 2) // 3
+    grad = grad_windows[:, :, width : 2 * width].copy()
+    grad[:, :-1] += grad_windows[:, 1:, :width]
+    grad[:, 1:] += grad_windows[:, :-1, 2 * width : 3 * width]
+    return grad
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CostModel:
+    """A trained tracking cost; what it was trained for stands on its card.
+
+    What it predicts is y = log of the largest error in m; that error holds a share of the yaw error
+    (`lcd_flight.learning.targets`).
+    """
+
+    network: Network
+    """3 F + 2 inputs, one output y; as many members as were trained."""
+    feature_mean: FloatArray
+    """(F,) taken from the features before the networks see them."""
+    feature_spread: FloatArray
+    """(F,) that they are divided by then."""
+    feature_low: FloatArray
+    """(F,) lower end of what the networks were trained on."""
+    feature_high: FloatArray
+    """(F,) upper end."""
+    card: ModelCard | None = None
+    """None for a model that was not saved yet."""
+
+    def value_and_gradient(
+        self, durations_s: FloatArray, coefficients: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The pessimistic log error of N plans and its gradients.
+
+        Args:
+            durations_s: (N, S) s, all > 0.
+            coefficients: (N, 4, S, 8), laid out as in `Trajectories`.
+
+        Returns:
+            The costs (N,), their gradients by the durations (N, S) with the coefficients held, and by the
+            coefficients (N, 4, S, 8). Not finite where the plan is not.
+        """
+        features = segment_features(durations_s, coefficients)
+        value, grad_features = np.empty(len(features)), np.empty(features.shape)
+        for rows in self._row_blocks(*durations_s.shape):
+            value[rows], grad_features[rows] = self._of_features(features[rows])
+        return value, *segment_features_pullback(durations_s, coefficients, grad_features)
+
+    def predict_segment_errors_m(self, durations_s: FloatArray, coefficients: FloatArray) -> FloatArray:
+        """(N, S) the largest error in each segment in m, by the mean of the members' logarithms: no pessimism."""
+        features = segment_features(durations_s, coefficients)
+        log_error = np.empty(durations_s.shape)
+        for rows in self._row_blocks(*durations_s.shape):
+            inputs = windows(self._normalised(features[rows]))
+            outputs, _ = self.network.forward(inputs.reshape(-1, inputs.shape[2]))
+            log_error[rows] = outputs.mean(axis=0, dtype=np.float64).reshape(inputs.shape[:2])
+        return np.asarray(np.exp(log_error))
+
+    def predict_max_error_m(self, durations_s: FloatArray, coefficients: FloatArray) -> FloatArray:
+        """(N,) the largest error of each plan in m: that of its worst segment."""
+        return np.asarray(self.predict_segment_errors_m(durations_s, coefficients).max(axis=1))
+
+    def out_of_range(self, durations_s: FloatArray, coefficients: FloatArray) -> tuple[str | None, ...]:
+        """For each plan None, or by what it leaves what the networks were trained on most."""
+        features = segment_features(durations_s, coefficients)
+        middle, half = 0.5 * (self.feature_low + self.feature_high), 0.5 * (self.feature_high - self.feature_low)
+        excess = np.nan_to_num(np.abs(features - middle) / half, nan=np.inf)
+        worst = excess.reshape(len(features), -1).argmax(axis=1)
+        segments, columns = np.unravel_index(worst, features.shape[1:])
+        return tuple(
+            self._excess(int(s), int(c), float(features[n, s, c])) if excess[n, s, c] > 1.0 else None
+            for n, (s, c) in enumerate(zip(segments, columns, strict=True))
+        )
+
+    def _excess(self, segment: int, column: int, value: float) -> str:
+        low, high = self.feature_low[column], self.feature_high[column]
+        return f"{FEATURE_NAMES[column]} of segment {segment + 1} is {value:.3g}, trained on {low:.3g} to {high:.3g}"
+
+    def _normalised(self, features: FloatArray) -> Array:
+        with np.errstate(over="ignore", invalid="ignore"):  # judged by the caller, as values that are not finite
+            scaled = (features - self.feature_mean) / self.feature_spread
+            return np.asarray(scaled.astype(self.network.dtype))
+
+    def _of_features(self, features: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The costs (N,) of features (N, S, F), and their gradient by these."""
+        inputs = windows(self._normalised(features))
+        with np.errstate(over="ignore", invalid="ignore"):
+            outputs, tape = self.network.forward(inputs.reshape(-1, inputs.shape[2]))
+            log_errors = outputs.astype(np.float64).reshape(-1, *inputs.shape[:2])
+            value, grad_log_errors = _aggregate(log_errors)
+            grad_inputs = self.network.backward(tape, grad_log_errors.reshape(len(log_errors), -1))
+            return value, windows_pullback(grad_inputs.reshape(inputs.shape)) / self.feature_spread
+
+    @staticmethod
+    def _row_blocks(tasks: int, segments: int) -> list[slice]:
+        step = max(1, _BATCH_WINDOWS // segments)
+        return [slice(first, first + step) for first in range(0, tasks, step)]
+
+
+def _aggregate(log_errors: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """From y of members, plans and segments (M, N, S) to the cost (N,), and its gradient by y."""
+    largest = log_errors.max(axis=2, keepdims=True)
+    powers = np.exp(SHARPNESS * (log_errors - largest))
+    sums = powers.sum(axis=2, keepdims=True)
+    of_member = (largest + np.log(sums) / SHARPNESS)[..., 0]
+    mean = of_member.mean(axis=0)
+    deviation = of_member - mean
+    std = np.sqrt((deviation**2).mean(axis=0) + _STD_FLOOR_SQUARED)
+    grad_of_member = (1.0 + PESSIMISM * deviation / std) / len(log_errors)
+    return mean + PESSIMISM * std, grad_of_member[..., None] * (powers / sums)
+
+
+def training_range(features: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """What counts as trained on, from features (..., F): the 0.1 and 99.9 % quantiles, a quarter of the span wider."""
+    rows = features.reshape(-1, features.shape[-1])
+    low, high = np.quantile(rows, [0.001, 0.999], axis=0)
+    margin = 0.25 * (high - low) + 1e-6
+    return low - margin, high + margin

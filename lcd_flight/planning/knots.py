@@ -93,7 +93,7 @@ class Whitening:
         )
 
     def plan(self, z: FloatArray, theta: FloatArray) -> Trajectories:
-        """The plans at z (N, S - 1, 3, 4) and theta (N, S); NaN where the variables are."""
+        """The plans at z (N, S - 1, 3, 4) and theta (N, S), in double precision; NaN where the variables are."""
         retimed = retime(self.durations_s, theta)
         coefficients = np.empty_like(self.minimum.coefficients)
         _kernel(_plan)(self.waypoints, retimed, self.factored, self._shifts(z), coefficients)

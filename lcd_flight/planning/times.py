@@ -42,7 +42,7 @@ def shortest_yaw(yaws_rad: FloatArray) -> FloatArray:
 
 def retime(durations_s: FloatArray, theta: FloatArray) -> FloatArray:
     """Durations (..., S) stretched by exp(0.7 tanh(theta / 0.7)) and rescaled to the same total."""
-    stretched = durations_s * np.exp(RETIME_REACH * np.tanh(theta / RETIME_REACH))
+    stretched = durations_s * np.exp(RETIME_REACH * np.tanh(np.asarray(theta, dtype=float) / RETIME_REACH))
     total = durations_s.sum(axis=-1, keepdims=True)
     return np.asarray(stretched * (total / stretched.sum(axis=-1, keepdims=True)))
 
@@ -51,7 +51,7 @@ def retime_pullback(retimed_s: FloatArray, theta: FloatArray, grad_durations: Fl
     """Gradient by theta (..., S) from the gradient by `retimed_s`, what `retime` gave for `theta`."""
     shares = retimed_s / retimed_s.sum(axis=-1, keepdims=True)
     mean = (grad_durations * shares).sum(axis=-1, keepdims=True)
-    slope = 1.0 - np.tanh(theta / RETIME_REACH) ** 2
+    slope = 1.0 - np.tanh(np.asarray(theta, dtype=float) / RETIME_REACH) ** 2
     return np.asarray(slope * retimed_s * (grad_durations - mean))
 
 

@@ -41,6 +41,8 @@ class LinkContext:
     """Voltage that a simulated vehicle starts with; None: full."""
     publish_pose: Callable[[bytes], None] | None = None
     """Where a simulated vehicle publishes its pose, as mocap frames (`lcd_flight.wire.mocap_frame`)."""
+    rigid_body: str = "vehicle"
+    """The name under which it does."""
 
 
 class Link(Protocol):

@@ -23,8 +23,10 @@ _MOST_ATTEMPTS = 10_000
 def sample_tasks(sampler: TaskSampler, seed: int, indices: IntArray, purpose: Purpose = "evaluation") -> Tasks:
     """The tasks with the given global indices (N,); those for training are others than those for evaluation.
 
-    Each waypoint is uniform in the part of the box that lies within the sampler's distances of the previous one
-    (paper, "Data Collection": drawn in the domain, kept when at least 1 m and no more than 3 m from the previous).
+    The first waypoint is uniform in the box. Each next one is a step away, uniform in the shell between the sampler's
+    distances; where it would leave the box it stops at the wall, and is drawn again where that made it too short.
+    The paper says no more than "four waypoints in sequence", "at least 1 m and no more than 3 m apart from the
+    previous one"; why it is this reading: decision 0040.
 
     Raises:
         ValueError: the sampler's box has no room for its distances.
@@ -53,7 +55,7 @@ def _box(sampler: TaskSampler) -> tuple[FloatArray, FloatArray]:
 
 
 def _next_waypoint(sampler: TaskSampler, stream: Stream, indices: IntArray, previous: FloatArray) -> FloatArray:
-    """(N, 3) candidates in a cube around the previous waypoint until each is in the box and in the shell.
+    """(N, 3) steps from the previous waypoint until each is good.
 
     Attempt a uses draws 3a to 3a + 2 of the task's own stream, so that a task's luck does not depend on the others.
     """
@@ -65,9 +67,10 @@ def _next_waypoint(sampler: TaskSampler, stream: Stream, indices: IntArray, prev
         if not len(pending):
             return result
         step = farthest * (2.0 * stream.uniforms(indices[pending], 3, first=3 * attempt) - 1.0)
-        candidate = previous[pending] + step
-        distance = np.linalg.norm(step, axis=1)
-        good = (nearest <= distance) & (distance <= farthest) & np.all((low <= candidate) & (candidate <= high), axis=1)
+        length = np.linalg.norm(step, axis=1)
+        candidate = np.clip(previous[pending] + step, low, high)
+        reached = np.linalg.norm(candidate - previous[pending], axis=1)
+        good = (nearest <= reached) & (length <= farthest)
         result[pending[good]] = candidate[good]
         pending = pending[~good]
     raise ValueError(f"no waypoint found {nearest:g} to {farthest:g} m from the last one in a box of {sampler.box_m} m")

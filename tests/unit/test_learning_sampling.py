@@ -78,6 +78,18 @@ def test_more_waypoints_go_on_from_the_same_ones():
     assert np.array_equal(first_tasks(longer, 5, 50).waypoints_m[:, :4], first_tasks(PAPER, 5, 50).waypoints_m)
 
 
+def test_a_step_through_a_wall_stops_at_it():
+    """A tenth of the waypoints or so lie on a wall; none is nearer to the last one than it may be."""
+    points = first_tasks(PAPER, seed=2, count=4_000).waypoints_m[:, 1:] - [0.0, 0.0, 5.0]
+    on_a_wall = np.isclose(np.abs(points), 5.0).any(axis=2)
+    assert 0.2 < on_a_wall.mean() < 0.4
+
+
+def test_training_and_evaluation_never_share_a_task():
+    training = sample_tasks(PAPER, 5, np.arange(100), purpose="training")
+    assert not np.isin(training.waypoints_m[:, 0], first_tasks(PAPER, 5, 100).waypoints_m[:, 0]).any()
+
+
 def test_no_yaw_span_means_yaw_zero():
     assert not first_tasks(TaskSampler(4, PAPER.box_m, PAPER.distance_m, 0.0), 1, 10).yaws_rad.any()
 

@@ -91,7 +91,7 @@ def shown_flow(value: Any) -> str:
         return "{" + ", ".join(f"{k}: {shown_flow(v)}" for k, v in value.items()) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(shown_flow, value)) + "]"
-    return str(value)
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _wrong_type(what: str) -> Callable[[ErrorDetails, Place | None], str]:

@@ -37,6 +37,8 @@ def _describe(schema: dict[str, Any], model: type[BaseModel]) -> None:
         prop = schema["properties"][key_of(attribute)]
         if unit:
             prop["description"] = f"{prop['description']} Unit: {unit}."
+        if "description" in prop:
+            prop["description"] = " ".join(prop["description"].split())
 
 
 class Keys(BaseModel):
@@ -80,18 +82,18 @@ def find_place(root: type[Keys], key: Key) -> Place | None:
         if not fields:
             return None
         attribute, info = fields[0]
-        models = tuple(_models_in(info.annotation))
+        models = tuple(models_in(info.annotation))
         place = Place(attribute, info, models)
     return place
 
 
-def _models_in(annotation: Any) -> Iterator[type[Keys]]:
+def models_in(annotation: Any) -> Iterator[type[Keys]]:
     """The models inside Annotated, unions and tuples."""
     if get_origin(annotation) is Annotated:
-        yield from _models_in(get_args(annotation)[0])
+        yield from models_in(get_args(annotation)[0])
     elif get_args(annotation):
         for inner in get_args(annotation):
-            yield from _models_in(inner)
+            yield from models_in(inner)
     elif isinstance(annotation, type) and issubclass(annotation, Keys):
         yield annotation
 

@@ -79,6 +79,8 @@ class Planner(Keys):
     and loop. Left out: the one that ships for the vehicle."""
     speed_m_per_s: Annotated[Real, Field(gt=0.0, le=20.0)] = 1.0
     """Mean speed over each segment between waypoints."""
+    weight: Annotated[Real, Field(gt=0.0, le=1000.0)] = 1.0
+    """Weight of the learned cost against extra snap."""
     transfer_speed_m_per_s: Annotated[Real, Field(gt=0.0, le=2.0)] = 0.5
     """Mean speed of the ways to a first waypoint and to the landing point."""
     limits: PlanLimits = PlanLimits()

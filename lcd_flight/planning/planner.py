@@ -1,0 +1,250 @@
+"""The projected solve: waypoints held exactly, tracking cost against extra snap, from minimum snap downhill.
+
+    min over z, theta of   weight * cost(plan) + lambda |z|^2 + lambda / 2 |theta|^2,   plan = Whitening.plan(z, theta)
+
+This is the paper's problem 3 in variables that satisfy its constraints whatever they are, with its c'Hc counted
+relative to the least snap there is: |z|^2. Each row is solved on its own by Adam from minimum snap (zeros), keeps its
+best iterate, and falls back to minimum snap, saying why, where that did not lead to a better plan.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from itertools import chain
+from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
+
+import numpy as np
+
+from lcd_flight.model import BoolArray, FloatArray, InputError, IntArray, Tasks, Trajectories
+from lcd_flight.planning.descent import descend
+from lcd_flight.planning.knots import Whitening
+from lcd_flight.planning.minimum_snap import snap
+
+Timing: TypeAlias = Literal["fixed", "retimed"]
+"""`fixed`: the durations as given. `retimed`: moved between segments at equal total time."""
+
+_BLOCK_SEGMENTS = 1024
+"""Segments that are planned at a time: batches for fast products, and a place to report and to stop."""
+
+
+class TrackingCost(Protocol):
+    """How well a plan will be tracked: lower is better, smooth in the plan. Learned or analytic."""
+
+    def value_and_gradient(
+        self, durations_s: FloatArray, coefficients: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Costs (N,) of plans (N, S), (N, 4, S, 8), and the gradients by both, each with the other held."""
+        ...
+
+
+@runtime_checkable
+class ErrorPredictor(TrackingCost, Protocol):
+    """A cost that can say how far the vehicle will stray, and where it should not be asked."""
+
+    def predict_max_error_m(self, durations_s: FloatArray, coefficients: FloatArray) -> FloatArray:
+        """(N,) largest position error of each plan."""
+        ...
+
+    def out_of_range(self, durations_s: FloatArray, coefficients: FloatArray) -> tuple[str | None, ...]:
+        """For each plan None, or how it differs from what the prediction is good for."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class PlannerOptions:
+    """How the solve weighs and walks."""
+
+    timing: Timing = "retimed"
+    snap_weight: float = 0.1
+    """lambda; a learned model's card holds the one that suits it."""
+    cost_weight: float = 1.0
+    """What the tracking cost is multiplied by; a mission's `weight`."""
+    iterations: int = 40
+    step: float = 0.08
+    """Adam's first step; it decays to zero along a cosine."""
+
+    def __post_init__(self) -> None:
+        """Refuse what no solve can use.
+
+        Raises:
+            InputError: a weight or step that is not positive and finite, or fewer than one iteration.
+        """
+        for name in ("snap_weight", "cost_weight", "step"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise InputError(f"{name} is {value}: it must be above 0 and finite")
+        if self.iterations < 1:
+            raise InputError(f"iterations is {self.iterations}: it must be at least 1")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlanResult:
+    """What became of N tasks."""
+
+    plans: Trajectories
+    minimum_snap: Trajectories
+    """What the solve began with, at the durations as given."""
+    cost: FloatArray
+    """(N,) tracking cost of the plans, in the cost's own unit."""
+    minimum_snap_cost: FloatArray
+    """(N,) never below `cost`."""
+    predicted_max_error_m: FloatArray
+    """(N,) of the plans; NaN where the cost does not predict errors."""
+    minimum_snap_predicted_max_error_m: FloatArray
+    """(N,) never below `predicted_max_error_m`."""
+    relative_snap: FloatArray
+    """(N,) snap of the position over the least possible at the durations as given."""
+    best_iteration: IntArray
+    """(N,) the iterate that was kept; 0 is minimum snap."""
+    fallback: tuple[str | None, ...]
+    """For each row None, or why it is minimum snap."""
+
+    def __len__(self) -> int:
+        """How many tasks there are."""
+        return len(self.plans)
+
+
+def plan_batch(
+    tasks: Tasks,
+    durations_s: FloatArray,
+    cost: TrackingCost,
+    options: PlannerOptions = PlannerOptions(),
+    progress: Callable[[int, int], None] | None = None,
+) -> PlanResult:
+    """Plan N tasks, each on its own.
+
+    Args:
+        tasks: of K >= 2 waypoints; two leave nothing to choose and give minimum snap.
+        durations_s: (N, K - 1) s.
+        cost: what to lower.
+        options: how.
+        progress: called with tasks done and all tasks; what it raises stops the planning.
+
+    Raises:
+        InputError: waypoints or durations that make no trajectory.
+    """
+    step = max(1, _BLOCK_SEGMENTS // max(1, durations_s.shape[1]))
+    parts = []
+    for first in range(0, len(tasks), step):
+        rows = slice(first, first + step)
+        parts.append(_plan(Whitening.of(tasks.poses[rows], durations_s[rows]), cost, options))
+        if progress is not None:
+            progress(min(first + step, len(tasks)), len(tasks))
+    return _joined(parts)
+
+
+def plan_task(
+    waypoints: FloatArray, durations_s: FloatArray, cost: TrackingCost, options: PlannerOptions = PlannerOptions()
+) -> PlanResult:
+    """`plan_batch` for one task: waypoints (K, 4) x, y, z in m and yaw in rad, durations_s (K - 1,)."""
+    return _plan(Whitening.of(np.asarray(waypoints)[None], np.asarray(durations_s)[None]), cost, options)
+
+
+def _plan(whitening: Whitening, cost: TrackingCost, options: PlannerOptions) -> PlanResult:
+    """Solve, then judge every row."""
+    objective = _Objective(whitening, cost, options)
+    descent = descend(objective, np.zeros((len(whitening), objective.size)), options.iterations, options.step)
+    found, minimum = whitening.plan(*objective.unpack(descent.best)), whitening.minimum
+    before, after = _Judgement.of(cost, minimum), _Judgement.of(cost, found)
+    reasons = tuple(
+        _why_not(segments=whitening.durations_s.shape[1], failed=failed, improved=improved, strange=strange)
+        for failed, improved, strange in zip(descent.failed, after.below(before), after.out_of_range, strict=True)
+    )
+    kept = np.array([reason is None for reason in reasons])
+    plans = Trajectories(
+        np.where(kept[:, None], found.durations_s, minimum.durations_s),
+        np.where(kept[:, None, None, None], found.coefficients, minimum.coefficients),
+    )
+    return PlanResult(
+        plans=plans,
+        minimum_snap=minimum,
+        cost=np.where(kept, after.cost, before.cost),
+        minimum_snap_cost=before.cost,
+        predicted_max_error_m=np.where(kept, after.max_error_m, before.max_error_m),
+        minimum_snap_predicted_max_error_m=before.max_error_m,
+        relative_snap=_position_snap(plans) / np.maximum(_position_snap(minimum), np.finfo(float).tiny),
+        best_iteration=np.where(kept, descent.best_iteration, 0),
+        fallback=reasons,
+    )
+
+
+class _Objective:
+    """What a descent lowers: variables are z, flattened, then theta, for each row."""
+
+    def __init__(self, whitening: Whitening, cost: TrackingCost, options: PlannerOptions) -> None:
+        self._whitening, self._cost, self._options = whitening, cost, options
+        self._z_size = math.prod(whitening.z_shape[1:])
+        self.size = self._z_size + whitening.durations_s.shape[1]
+
+    def unpack(self, variables: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """z (N, S - 1, 3, 4) and theta (N, S)."""
+        return variables[:, : self._z_size].reshape(self._whitening.z_shape), variables[:, self._z_size :]
+
+    def __call__(self, variables: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Values (N,) and gradients (N, V)."""
+        z, theta = self.unpack(variables)
+        plans = self._whitening.plan(z, theta)
+        cost, grad_durations, grad_coefficients = self._cost.value_and_gradient(plans.durations_s, plans.coefficients)
+        grad_z, grad_theta = self._whitening.pullback(z, theta, grad_durations, grad_coefficients)
+        weights = np.full(self.size, self._options.snap_weight)
+        weights[self._z_size :] *= 0.5
+        value = self._options.cost_weight * cost + (variables**2) @ weights
+        grad = np.concatenate([grad_z.reshape(len(variables), -1), grad_theta], axis=1)
+        grad = self._options.cost_weight * grad + 2.0 * weights * variables
+        if self._options.timing == "fixed":
+            grad[:, self._z_size :] = 0.0
+        return value, grad
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Judgement:
+    """What a cost says of plans."""
+
+    cost: FloatArray
+    max_error_m: FloatArray
+    out_of_range: tuple[str | None, ...]
+
+    @staticmethod
+    def of(cost: TrackingCost, plans: Trajectories) -> _Judgement:
+        value, _, _ = cost.value_and_gradient(plans.durations_s, plans.coefficients)
+        if not isinstance(cost, ErrorPredictor):
+            return _Judgement(value, np.full(len(plans), np.nan), (None,) * len(plans))
+        error = cost.predict_max_error_m(plans.durations_s, plans.coefficients)
+        return _Judgement(value, error, cost.out_of_range(plans.durations_s, plans.coefficients))
+
+    def below(self, other: _Judgement) -> BoolArray:
+        """(N,) whether the cost is lower, and the predicted error too where there is one."""
+        return (self.cost < other.cost) & ~(self.max_error_m >= other.max_error_m)
+
+
+def _why_not(*, segments: int, failed: bool, improved: bool, strange: str | None) -> str | None:
+    """Why a row is minimum snap; None where its plan is good."""
+    if segments == 1:
+        return "two waypoints leave nothing to choose"
+    if failed:
+        return "the cost or its gradient was not finite"
+    if not improved:
+        return "no plan was predicted to be better than minimum snap"
+    if strange is not None:
+        return f"outside what the cost was trained on: {strange}"
+    return None
+
+
+def _position_snap(plans: Trajectories) -> FloatArray:
+    return np.asarray(snap(plans)[:, :3].sum(axis=1))
+
+
+def _joined(parts: list[PlanResult]) -> PlanResult:
+    """The blocks of a batch, one after another."""
+    values = {f.name: _concatenated([getattr(part, f.name) for part in parts]) for f in fields(PlanResult)}
+    return PlanResult(**values)
+
+
+def _concatenated(parts: list[Any]) -> Any:
+    if isinstance(parts[0], tuple):
+        return tuple(chain.from_iterable(parts))
+    if isinstance(parts[0], Trajectories):
+        return Trajectories(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Trajectories)))
+    return np.concatenate(parts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import struct
 from collections import defaultdict
 from collections.abc import Iterator
@@ -11,9 +12,10 @@ from typing import IO
 
 import msgspec
 import zstandard
-from mcap.exceptions import InvalidMagic, McapError
+from mcap.exceptions import McapError
 from mcap.records import Attachment, Channel, Footer, Header, McapRecord, Message, Metadata
 from mcap.stream_reader import StreamReader
+from mcap.writer import MCAP0_MAGIC
 
 from lcd_flight.model import InputError, Tick, TickInputs
 from lcd_flight.record import codec
@@ -86,21 +88,21 @@ def _read(path: Path) -> tuple[FlightHeader, list[tuple[TickInputs, Tick]], bool
 
 
 def _content(path: Path, stream: IO[bytes]) -> _Content:
-    """All records that can be read.
+    """All records up to the end, or to the first that is not whole.
 
     Raises:
-        InputError: there is not even a beginning.
+        InputError: it does not even begin as MCAP.
     """
+    beginning = stream.read(len(MCAP0_MAGIC))
+    if not beginning:
+        raise InputError(f"{path}: is empty")
+    if not MCAP0_MAGIC.startswith(beginning):
+        raise InputError(f"{path}: is not an MCAP file; flight logs end in .mcap")
+    stream.seek(0)
     content = _Content()
-    try:
+    with contextlib.suppress(*_DAMAGE):
         for record in _records(stream):
             _take(content, record)
-    except InvalidMagic as error:
-        if content.header is None:
-            raise InputError(f"{path}: is not an MCAP file; flight logs end in .mcap") from error
-    except _DAMAGE as error:
-        if path.stat().st_size == 0:
-            raise InputError(f"{path}: is empty") from error
     return content
 
 

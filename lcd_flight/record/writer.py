@@ -23,6 +23,9 @@ CHUNK_BYTES = 64 * 1024
 FLUSH_EACH_NS = 500_000_000
 """In the ticks' own time, so that equal ticks make equal chunks."""
 
+_LAST_STAMP_NS = 2**64 - 1
+"""MCAP's stamps are unsigned; a source's clock may be anything."""
+
 
 class LogWriter:
     """Writes one log. It may wait for the disk: a flight writes through `lcd_flight.observers.log_thread`.
@@ -43,14 +46,18 @@ class LogWriter:
         self._flushed_ns: int | None = None
         self._phase: Phase | None = None
         self._findings: frozenset[str] = frozenset()
+        self._owned = isinstance(target, Path)
         try:
             self._stream = target.open("xb") if isinstance(target, Path) else target
-            self._owned = isinstance(target, Path)
-            self._mcap = Writer(self._stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
-            self._describe(flight)
-            self._channels = {topic.name: self._register(topic) for topic in TOPICS}
-            self.sync()
         except OSError as error:
+            raise RefusedError(f"cannot write the flight log {target}: {error.strerror}") from error
+        self._mcap = Writer(self._stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+        self._channels = {topic.name: self._register(topic) for topic in TOPICS}
+        try:
+            self._describe()
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                self._let_go()
             raise RefusedError(f"cannot write the flight log {target}: {error.strerror}") from error
 
     def write(self, inputs: TickInputs, tick: Tick) -> None:
@@ -93,16 +100,21 @@ class LogWriter:
             self._mcap.finish()  # type: ignore[no-untyped-call]
             self.sync()
         finally:
-            if self._owned:
-                self._stream.close()
+            self._let_go()
 
-    def _describe(self, flight: FlightHeader) -> None:
+    def _let_go(self) -> None:
+        if self._owned:
+            self._stream.close()
+
+    def _describe(self) -> None:
+        """Put all that is known before the flight on the disk."""
         version = importlib.metadata.version("lcd-flight")
         self._mcap.start(profile=PROFILE, library=f"lcd-flight {version}")
-        for name, values in metadata(flight).items():
+        for name, values in metadata(self._flight).items():
             self._mcap.add_metadata(name, values)
-        for name, (media_type, data) in attachments(flight).items():
+        for name, (media_type, data) in attachments(self._flight).items():
             self._mcap.add_attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
+        self.sync()
 
     def _register(self, topic: Topic) -> int:
         schema_id = self._mcap.register_schema(topic.schema_name, topic.schema_encoding, topic.schema_data())
@@ -120,7 +132,7 @@ class LogWriter:
         """What moves."""
         now_ns, state, raw = tick.now_ns, inputs.pose.state, inputs.pose.raw
         if state is not None:
-            stamp_ns = raw.source_stamp_ns if raw is not None else now_ns
+            stamp_ns = now_ns if raw is None else min(max(raw.source_stamp_ns, 0), _LAST_STAMP_NS)
             self._add_message(topics.TRANSFORMS, viewer.transforms(now_ns, state), tick)
             self._add_message(topics.POSE, viewer.vehicle_pose(now_ns, state), tick, stamp_ns)
         if tick.reference is not None:

@@ -98,6 +98,10 @@ class PlanResult:
     """(N,) snap of the position over the least possible at the durations as given."""
     best_iteration: IntArray
     """(N,) the iterate that was kept; 0 is minimum snap."""
+    z: FloatArray
+    """(N, S - 1, 3, 4) what the solve found (`Whitening.plan`), also where it fell back: data for training."""
+    theta: FloatArray
+    """(N, S) likewise."""
     fallback: tuple[str | None, ...]
     """For each row None, or why it is minimum snap."""
 
@@ -146,7 +150,8 @@ def _plan(whitening: Whitening, cost: TrackingCost, options: PlannerOptions) -> 
     """Solve, then judge every row."""
     objective = _Objective(whitening, cost, options)
     descent = descend(objective, np.zeros((len(whitening), objective.size)), options.iterations, options.step)
-    found, minimum = whitening.plan(*objective.unpack(descent.best)), whitening.minimum
+    z, theta = objective.unpack(descent.best)
+    found, minimum = whitening.plan(z, theta), whitening.minimum
     before, after = _Judgement.of(cost, minimum), _Judgement.of(cost, found)
     reasons = tuple(
         _why_not(segments=whitening.durations_s.shape[1], failed=failed, improved=improved, strange=strange)
@@ -166,6 +171,8 @@ def _plan(whitening: Whitening, cost: TrackingCost, options: PlannerOptions) -> 
         minimum_snap_predicted_max_error_m=before.max_error_m,
         relative_snap=_position_snap(plans) / np.maximum(_position_snap(minimum), np.finfo(float).tiny),
         best_iteration=np.where(kept, descent.best_iteration, 0),
+        z=z,
+        theta=theta,
         fallback=reasons,
     )
 

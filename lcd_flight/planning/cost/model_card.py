@@ -18,12 +18,12 @@ class ModelCard(BaseModel):
     vehicle_fingerprint: str
     """Of all that matters about the vehicle (`lcd_flight.worlds`); what a mission's vehicle is compared with."""
     loop: Loop
-    world: str
-    world_version: int
+    worlds: tuple[str, ...]
+    """What the data come from, with the version of each: `crazyflie-paper v1`."""
     parasitic_drag: tuple[Vector3, ...]
     """c_D in N/(m/s)^2 of each drag configuration in the data."""
-    speed: FiniteFloat
-    """m/s of the tasks in the data."""
+    speeds: tuple[FiniteFloat, ...]
+    """m/s of the tasks in the data, for each world."""
     rollouts: int
     """How many it was trained on."""
     data_hash: str

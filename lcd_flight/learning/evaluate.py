@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from lcd_flight.learning.methods import Planned, Problem, Timing, find_method, shipped_model
+from lcd_flight.learning.methods import Planned, Problem, find_method, shipped_model
 from lcd_flight.learning.progress import Meter, ProgressCallback, ignore
 from lcd_flight.learning.sampling import first_tasks
 from lcd_flight.model import (
@@ -29,6 +29,7 @@ from lcd_flight.model import (
 )
 from lcd_flight.model.streams import Stream
 from lcd_flight.planning.minimum_snap import minimum_snap_batch, snap
+from lcd_flight.planning.planner import Timing
 
 _MOST_NOISE_SEEDS = 1 << 20
 _CHUNK = 100

@@ -4,15 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
-from lcd_flight.model import BoolArray, FloatArray, InputError, IntArray, Simulator, Tasks, Trajectories, Vehicle, World
+from lcd_flight.model import (
+    BoolArray,
+    FloatArray,
+    InputError,
+    IntArray,
+    RolloutOptions,
+    Simulator,
+    Tasks,
+    Trajectories,
+    Vehicle,
+    World,
+)
+from lcd_flight.planning.cost.model_file import check_fits, load_model
+from lcd_flight.planning.cost.proxy import ThrustProxy
+from lcd_flight.planning.knots import Whitening
 from lcd_flight.planning.minimum_snap import minimum_snap_batch
-
-Timing: TypeAlias = Literal["fixed", "retimed"]
-"""`fixed`: the paper's time allocation. `retimed`: moved between segments at equal total time."""
+from lcd_flight.planning.planner import PlannerOptions, Timing, TrackingCost, plan_batch
+from lcd_flight.planning.search import Arena, SearchSettings
+from lcd_flight.planning.search import search as search_in_simulator
+from lcd_flight.worlds import fingerprint
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,7 +76,50 @@ def minimum_snap(problem: Problem) -> Planned:
     return Planned(plans, np.zeros(len(plans), bool))
 
 
-METHODS: dict[str, Method] = {"minimum-snap": minimum_snap}
+def analytic(problem: Problem) -> Planned:
+    """The projected solve on the analytic cost: no learning, no simulator."""
+    return _solved(problem, ThrustProxy(), PlannerOptions(problem.timing))
+
+
+def learned(problem: Problem) -> Planned:
+    """The projected solve on the learned cost: no simulator.
+
+    Raises:
+        InputError: the model is missing, damaged, or trained for another vehicle or loop.
+    """
+    model = load_model(problem.model)
+    check_fits(model, fingerprint(problem.vehicle), problem.world.loop)
+    assert model.card is not None  # noqa: S101 - a loaded model has one
+    return _solved(problem, model, PlannerOptions(problem.timing, model.card.snap_weight))
+
+
+def search(problem: Problem) -> Planned:
+    """The cross-entropy method in the simulator from minimum snap, 320 rollouts a task: what learning is held against."""
+    space = Whitening.of(problem.tasks.poses, problem.durations_s)
+    options = RolloutOptions(loop=problem.world.loop, start_aligned=problem.world.start_aligned)
+    found = search_in_simulator(
+        space,
+        np.zeros(space.z_shape),
+        np.zeros(space.durations_s.shape),
+        Arena(problem.simulator, problem.vehicle, options),
+        seed=problem.seed,
+        tasks=problem.indices,
+        settings=SearchSettings() if problem.timing == "retimed" else SearchSettings(theta_sd=0.0),
+    )
+    return Planned(space.plan(found.z, found.theta), np.zeros(len(space), bool))
+
+
+def _solved(problem: Problem, cost: TrackingCost, options: PlannerOptions) -> Planned:
+    result = plan_batch(problem.tasks, problem.durations_s, cost, options)
+    return Planned(result.plans, np.array([reason is not None for reason in result.fallback]))
+
+
+METHODS: dict[str, Method] = {
+    "minimum-snap": minimum_snap,
+    "analytic": analytic,
+    "learned": learned,
+    "search": search,
+}
 
 
 def find_method(name: str) -> Method:

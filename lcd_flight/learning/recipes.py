@@ -1,0 +1,77 @@
+"""What a model is made from: worlds, data, rounds and networks; and two recipes that are known to work."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from lcd_flight.learning.collect import CollectConfig, Mix
+from lcd_flight.learning.fit import FitSettings
+from lcd_flight.learning.policy import DRAWS
+from lcd_flight.model import InputError, World
+from lcd_flight.worlds import fingerprint as vehicle_fingerprint
+
+
+@dataclass(frozen=True, slots=True)
+class TrainConfig:
+    """What a model is a function of."""
+
+    name: str
+    worlds: tuple[World, ...]
+    """Of one vehicle and one loop; the data are shared out evenly among them."""
+    seed: int = 0
+    count: int = 800_000
+    """Rollouts before the first round, of all worlds together."""
+    rounds: int = 2
+    """On-policy rounds after the first model."""
+    policy_tasks: int = 6_000
+    """Planned in each round, of all worlds together; each gives 16 rollouts."""
+    members: int = 1
+    snap_weight: float = 0.1
+    drags: tuple[int, ...] = (1, 2, 3, 4, 5)
+    mix: Mix = field(default_factory=Mix)
+    fit: FitSettings = field(default_factory=FitSettings)
+
+    def __post_init__(self) -> None:
+        """Check that one network can serve the worlds.
+
+        Raises:
+            InputError: no world, or worlds of several vehicles, loops or numbers of waypoints.
+        """
+        if not self.worlds:
+            raise InputError("training needs at least one world")
+        kinds = {(vehicle_fingerprint(w.base_vehicle), w.loop, w.sampler.waypoints) for w in self.worlds}
+        if len(kinds) > 1:
+            names = ", ".join(w.name for w in self.worlds)
+            raise InputError(f"worlds {names}: not of one vehicle, one loop and one number of waypoints")
+
+    def collecting(self, world: World) -> CollectConfig:
+        """The base data of a world."""
+        return CollectConfig(world, self.seed, self.drags, self.mix)
+
+    @property
+    def count_of_each(self) -> int:
+        """Rollouts of each world before the first round."""
+        return -(-self.count // len(self.worlds))
+
+    @property
+    def policy_tasks_of_each(self) -> int:
+        """Tasks of each world in each round."""
+        return -(-self.policy_tasks // len(self.worlds))
+
+    @property
+    def capacity(self) -> int:
+        """Rollouts in all."""
+        return len(self.worlds) * (self.count_of_each + self.rounds * self.policy_tasks_of_each * DRAWS)
+
+
+def small_recipe(name: str, worlds: tuple[World, ...], seed: int = 0) -> TrainConfig:
+    """About a million labels and one network: a minute or two on two cores."""
+    return TrainConfig(name, worlds, seed)
+
+
+def full_recipe(name: str, worlds: tuple[World, ...], seed: int = 0) -> TrainConfig:
+    """About four million labels and two networks; what the shipped models are made by."""
+    return TrainConfig(name, worlds, seed, count=2_600_000, rounds=3, policy_tasks=25_500, members=2)
+
+
+RECIPES = {"small": small_recipe, "full": full_recipe}

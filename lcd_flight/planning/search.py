@@ -37,11 +37,11 @@ EARLY_EXIT_ERROR_M = 5.0
 class SearchSettings:
     """How far and how long to search."""
 
-    population: int = 32
+    population: int = 16
     """Rollouts of each task in each generation."""
-    generations: int = 10
+    generations: int = 20
     elite_share: float = 0.2
-    z_sd: float = 0.25
+    z_sd: float = 0.4
     """Initial standard deviation of z for one segment; for S of them it is divided by sqrt(S), since the snap that z
     is relative to is the sum over all."""
     theta_sd: float = 0.1
@@ -161,14 +161,18 @@ def _fly(number: int, samples: FloatArray, crowd: Whitening, arena: Arena, noise
 def _elite_moments(
     samples: FloatArray, costs: FloatArray, spread: FloatArray, share: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Weighted mean and standard deviation (N, D) of each task's elite, best ranks weighing most."""
+    """The next mean and standard deviation (N, D): those of each task's elite, best ranks weighing most.
+
+    The spread is about the mean that the population was drawn around, so that it grows along a step that paid, and
+    half of the old variance stays, so that few elites do not end the search.
+    """
     elites = max(2, math.ceil(share * samples.shape[1]))
     order = np.argsort(costs, axis=1, kind="stable")[:, :elites]
     chosen = np.take_along_axis(samples, order[..., None], axis=1)
     weights = math.log(elites + 0.5) - np.log(np.arange(1, elites + 1))
     weights = (weights / weights.sum())[None, :, None]
     mean = (weights * chosen).sum(axis=1)
-    variance = (weights * (chosen - mean[:, None]) ** 2).sum(axis=1)
+    variance = (weights * (chosen - samples[:, :1]) ** 2).sum(axis=1)
     return mean, np.sqrt(0.5 * (variance + spread**2))
 
 

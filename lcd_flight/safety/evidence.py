@@ -6,16 +6,12 @@ import math
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
-from lcd_flight.model import Quaternion, RawPose, State, Telemetry, TickInputs
-from lcd_flight.model.frames import angle_between
+from lcd_flight.model import State, Telemetry, TickInputs
 
 SATURATION_TICKS = 50
 """Window of the saturation share: 0.5 s."""
 SKIPPED_TICKS = 100
 """Window of the share of skipped ticks: 1 s."""
-FROZEN_FRAMES = 3
-"""So many equal frames while the vehicle turns are a frozen source."""
-FROZEN_TURN_RAD = math.radians(1.0)
 
 
 class Scope(IntEnum):
@@ -41,10 +37,6 @@ class SafetyMemory:
     """The pose source's counter at the tick before."""
     seen_ns: int | None = None
     """Arrival of the newest pose that could be used."""
-    distinct: RawPose | None = None
-    """The first of the newest run of equal frames."""
-    distinct_q_WB: Quaternion | None = None
-    """Onboard attitude when it came."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,12 +70,9 @@ class Evidence:
 
 
 def pose_seen(inputs: TickInputs, memory: SafetyMemory) -> tuple[bool, SafetyMemory]:
-    """Whether this tick's pose can be used: valid, finite and not frozen; and the memory with it noted.
-
-    Frozen means: the same pose in three frames or more while the vehicle reports that it turns.
-    """
-    pose, memory = inputs.pose, _distinct_noted(inputs, memory)
-    if pose.state is None or pose.age_ns is None or not _is_finite(pose.state) or _is_frozen(inputs, memory):
+    """Whether this tick's pose can be used, that is valid and finite; and the memory with it noted."""
+    pose = inputs.pose
+    if pose.state is None or pose.age_ns is None or not _is_finite(pose.state):
         return False, memory
     return True, replace(memory, seen_ns=inputs.now_ns - pose.age_ns)
 
@@ -135,22 +124,3 @@ def _pushed(bits: int, value: bool, count: int, size: int) -> int:
 
 def _is_finite(state: State) -> bool:
     return all(map(math.isfinite, (*state.p_WB, *state.v_WB_W, *state.q_WB, *state.w_WB_B)))
-
-
-def _distinct_noted(inputs: TickInputs, memory: SafetyMemory) -> SafetyMemory:
-    raw, before = inputs.pose.raw, memory.distinct
-    if raw is None or (before is not None and raw.p_WB == before.p_WB and raw.q_WB == before.q_WB):
-        return memory
-    return replace(memory, distinct=raw, distinct_q_WB=_onboard_attitude(inputs))
-
-
-def _is_frozen(inputs: TickInputs, memory: SafetyMemory) -> bool:
-    raw, first, then, now = inputs.pose.raw, memory.distinct, memory.distinct_q_WB, _onboard_attitude(inputs)
-    if raw is None or first is None or then is None or now is None:
-        return False
-    return raw.sequence - first.sequence >= FROZEN_FRAMES - 1 and angle_between(then, now) > FROZEN_TURN_RAD
-
-
-def _onboard_attitude(inputs: TickInputs) -> Quaternion | None:
-    telemetry = inputs.link.telemetry
-    return None if telemetry is None else telemetry.q_WB

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 from lcd_flight.model import Geofence, Vector3
 
 STOPPING_DECELERATION = 4.0
-"""m/s^2 on each axis, what a stop is planned with: a tilt of 22 degrees, which every shipped vehicle can do."""
+"""m/s^2, what a stop is planned with: a tilt of 22 degrees, which every shipped vehicle can do."""
 
 
 def stopping_point_m(p_W: Vector3, v_W: Vector3) -> Vector3:
-    """Where a vehicle at `p_W` in m with `v_W` in m/s comes to rest when each axis brakes: p + v |v| / (2 a)."""
-    x, y, z = (p + v * abs(v) / (2.0 * STOPPING_DECELERATION) for p, v in zip(p_W, v_W, strict=True))
-    return (x, y, z)
+    """Where a vehicle at `p_W` in m with `v_W` in m/s comes to rest, braking straight on: p + v |v| / (2 a)."""
+    reach_s = math.hypot(*v_W) / (2.0 * STOPPING_DECELERATION)
+    return (p_W[0] + v_W[0] * reach_s, p_W[1] + v_W[1] * reach_s, p_W[2] + v_W[2] * reach_s)
 
 
 def stopping_margin_m(fence: Geofence, p_W: Vector3, v_W: Vector3) -> float:

@@ -52,12 +52,15 @@ def preflight(samples: Sequence[TickInputs], plan: FlightPlan, limits: SafetyLim
 
 def _pose_rate(samples: Sequence[TickInputs], limits: SafetyLimits) -> Check:
     first, last = samples[0], samples[-1]
-    frames = (last.pose.received - last.pose.rejected) - (first.pose.received - first.pose.rejected)
-    rate_hz = frames / ((last.now_ns - first.now_ns) * 1e-9)
+    rate_hz = (_usable_frames(last) - _usable_frames(first)) / ((last.now_ns - first.now_ns) * 1e-9)
     low, high = (share * limits.expected_pose_rate_hz for share in RATE_SHARES)
     text = f"pose {rate_hz:.1f} Hz"
     remedy = f"{text}, not {low:.0f} to {high:.0f} Hz: set motion_capture.rate or the mocap system to the other's rate"
     return _check("pose rate", low <= rate_hz <= high, text, remedy)
+
+
+def _usable_frames(sample: TickInputs) -> int:
+    return sample.pose.received - sample.pose.rejected - sample.pose.late
 
 
 def _pose_age(samples: Sequence[TickInputs], limits: SafetyLimits) -> Check:

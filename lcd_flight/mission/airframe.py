@@ -106,7 +106,10 @@ def vehicle_fits(draft: Draft) -> list[tuple[Key, str]]:
         return [(("vehicle", "type"), line) for line in str(error).splitlines()]
     if vehicle.onboard is None:
         return [
-            (("vehicle", "type"), f'"{keys.type}" has no onboard controller to fly thrust and attitude; choose another')
+            (
+                ("vehicle", "type"),
+                f'"{keys.type}" has no onboard controller to fly thrust and attitude; choose another vehicle',
+            )
         ]
     return _too_fast(draft, vehicle)
 

@@ -96,10 +96,11 @@ def inside_fence(draft: Draft) -> Found:
         return
     for key, what, axis, value in _coordinates(draft):
         low, high = fence.min_m[axis], fence.max_m[axis]
+        up, down = ("raise", "lower") if axis == 2 else ("move", "move")
         if value > high:
-            yield key, f"{value:g} is above the geofence's {high:g} m; lower {what} or raise safety.geofence.max"
+            yield key, f"{value:g} is above the geofence's {high:g} m; {down} {what} or raise safety.geofence.max"
         if value < low:
-            yield key, f"{value:g} is below the geofence's {low:g} m; raise {what} or lower safety.geofence.min"
+            yield key, f"{value:g} is below the geofence's {low:g} m; {up} {what} or lower safety.geofence.min"
 
 
 def _coordinates(draft: Draft) -> Iterator[tuple[Key, str, int, float]]:

@@ -22,7 +22,7 @@ def explanations(error: ValidationError, root: type[Keys]) -> Iterator[tuple[Key
             continue  # long enough: pydantic counts valid items only, and the others are told of by themselves
         key = _key_in_file(detail["loc"])
         if detail["type"] in ("missing", "too_long") and key and _is_point(detail, key):
-            yield _point_length(key, detail["input"])
+            yield _point_length(key, detail["input"], root)
             continue
         yield key, _explain(detail, key, root)
 
@@ -56,10 +56,11 @@ def _is_point(detail: ErrorDetails, key: Key) -> bool:
     return isinstance(detail["input"], list | tuple) and (detail["type"] == "too_long" or isinstance(key[-1], int))
 
 
-def _point_length(key: Key, values: list[Any]) -> tuple[Key, str]:
-    """A position with too few or too many numbers."""
-    own = key[:-1] if isinstance(key[-1], int) else key
-    return own, f"has {len(values)} numbers, must have 3; write [x, y, z] in m"
+def _point_length(key: Key, values: list[Any], root: type[Keys]) -> tuple[Key, str]:
+    """A position, or another vector, with too few or too many numbers."""
+    own, place = key[:-1] if isinstance(key[-1], int) else key, find_place(root, key)
+    unit = f" in {place.unit}" if place and place.unit else ""
+    return own, f"has {len(values)} numbers, must have 3; write [x, y, z]{unit}"
 
 
 def _explain(detail: ErrorDetails, key: Key, root: type[Keys]) -> str:
@@ -145,7 +146,7 @@ def _length(detail: ErrorDetails, _: Place | None) -> str:
     least, most = ctx.get("min_length"), ctx.get("max_length")
     bound = f"at least {least}" if least is not None else f"at most {most}"
     what = "characters" if isinstance(detail["input"], str) else "items"
-    return f"has {len(detail['input'])} {what}; write {bound}"
+    return f"has length {len(detail['input'])}; write {bound} {what}"
 
 
 def _no_item(detail: ErrorDetails, _: Place | None) -> str:

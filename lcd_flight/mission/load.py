@@ -45,12 +45,20 @@ def find_mission(name_or_path: str | Path) -> Path:
         InputError: a bare name (no folder, no suffix) that is neither a file nor a mission that ships.
     """
     path = Path(name_or_path)
-    if path.exists() or path.suffix or path.parent != Path():
+    if path.suffix or len(path.parts) != 1 or _exists(path):
         return path
     shipped = shipped_missions()
     if path.name not in shipped:
         raise InputError(f"{path}: no such mission; {did_you_mean(path.name, shipped)}, or give a file's path")
     return shipped[path.name]
+
+
+def _exists(path: Path) -> bool:
+    """Whether there is such a file; also where it cannot be looked up, since reading it tells why."""
+    try:
+        return path.exists()
+    except OSError:
+        return True
 
 
 def shipped_missions() -> dict[str, Path]:

@@ -7,6 +7,7 @@ Sources: yaml.org/type (int, float, bool, timestamp; YAML 1.1), yaml.org/spec/1.
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -58,7 +59,7 @@ def read_word(text: str) -> Word:
     if len(text) <= LONGEST_NUMBER:
         if _INT.fullmatch(text):
             return Word(int(text))
-        if _FLOAT.fullmatch(text):
+        if _FLOAT.fullmatch(text) and math.isfinite(float(text)):
             return Word(float(text))
     return _trap(text) or Word(text)
 
@@ -79,6 +80,8 @@ def _loose_number(text: str) -> Word:
     if len(text) > LONGEST_NUMBER:
         return Word(None, f"a number of {len(text)} characters; write at most {LONGEST_NUMBER}")
     value = float(text.replace("_", ""))
+    if not math.isfinite(value):
+        return Word(None, f"{text} is too large to be read; write a smaller number")
     whole = value.is_integer() and not set(text) & set(".eE")
     number = int(value) if whole else value
     octal = whole and text.lstrip("+-").startswith("0")

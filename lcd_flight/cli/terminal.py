@@ -39,6 +39,7 @@ class Terminal:
         self.quiet = quiet
         self._color = color
         self._console: Console | None = None
+        self._status_shown = False
 
     @classmethod
     def from_arguments(cls, arguments: Sequence[str]) -> Terminal:
@@ -67,6 +68,7 @@ class Terminal:
 
     def line(self, label: str, text: str, style: str = "") -> None:
         """One line of the story: `CHECK      mission ok: ...`."""
+        self.end_status()
         if not self.quiet:
             self.console.print(f"{label:<{LABEL_WIDTH}}", style=f"bold {style}".strip(), end="")
             self.console.print(text, style=style or None)
@@ -76,8 +78,29 @@ class Terminal:
         if not self.quiet:
             self.console.print(" " * (LABEL_WIDTH + 2) + text)
 
+    def status(self, text: str) -> None:
+        """A line that the next one replaces; only where a person is watching."""
+        if self.interactive:
+            width = self.console.width
+            self.console.file.write(f"\r{' ' * LABEL_WIDTH}{text[: width - LABEL_WIDTH - 1]}\x1b[K")
+            self.console.file.flush()
+            self._status_shown = True
+
+    def end_status(self) -> None:
+        """Take the changing line away."""
+        if self._status_shown:
+            self.console.file.write("\r\x1b[K")
+            self.console.file.flush()
+            self._status_shown = False
+
+    def ask(self, text: str) -> None:
+        """A question whose answer is typed behind it."""
+        self.console.print(" " * (LABEL_WIDTH + 2) + text, end="")
+        self.console.file.flush()
+
     def warn(self, text: str) -> None:
         """A warning; shown even when quiet."""
+        self.end_status()
         self.console.print(f" WARN {text}", style="yellow")
 
     def finish(self, outcome: Outcome, result: Mapping[str, Any]) -> int:

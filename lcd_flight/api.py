@@ -1,0 +1,142 @@
+"""The Python API: plan a mission, rehearse it, fly it.
+
+from lcd_flight import fly, plan, rehearse
+
+flight = plan("missions/four_waypoints.yaml")
+rehearsal = rehearse(flight)
+print(rehearsal.text)
+if rehearsal.passed:
+flown = fly(flight, rehearsal, FlightOptions(fast=True))
+print(flown.result.outcome, flown.figures.max_position_error_m, flown.log)
+"""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from lcd_flight import plugins
+from lcd_flight.flight.progress import Progress
+from lcd_flight.flight.result import FlightResult
+from lcd_flight.flight.session import FlightOptions, run_flight
+from lcd_flight.mission import Mission, load_mission
+from lcd_flight.mission.airframe import vehicle_of
+from lcd_flight.mission.plan_mission import PlannedMission, load_cost, plan_mission
+from lcd_flight.model import RefusedError, Vehicle
+from lcd_flight.observers.log_thread import LogStatistics, LogThread
+from lcd_flight.record import FlightHeader, LogWriter, log_path, read_log
+from lcd_flight.rehearsal import rehearse as rehearsals
+from lcd_flight.rehearsal.verdict import Rehearsal
+from lcd_flight.review.figures import FlightFigures, figures_of
+from lcd_flight.review.page import write_page
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PreparedFlight:
+    """A mission with its vehicle and its plan."""
+
+    mission: Mission
+    vehicle: Vehicle
+    planned: PlannedMission
+    model_card: dict[str, object]
+    """Of the learned cost; empty where there is none."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlownMission:
+    """What a flight left behind."""
+
+    result: FlightResult
+    figures: FlightFigures
+    log: Path
+    log_statistics: LogStatistics
+    report: Path
+
+
+def plan(mission: Mission | str | Path) -> PreparedFlight:
+    """Plan a mission, given as it is, by file, or by the name of one that ships.
+
+    Raises:
+        InputError: the mission or its model is wrong; every problem of the file, a line each.
+        RefusedError: the planned path leaves the fence, breaks the planner's limits or outlasts the battery.
+    """
+    loaded = mission if isinstance(mission, Mission) else load_mission(mission)
+    vehicle = vehicle_of(loaded)
+    cost = None if loaded.planner.type == "minimum-snap" else load_cost(loaded, vehicle)
+    card = {} if cost is None or cost.card is None else cost.card.model_dump(mode="json")
+    return PreparedFlight(loaded, vehicle, plan_mission(loaded, vehicle, cost), card)
+
+
+def rehearse(
+    flight: PreparedFlight, runs: int | None = None, progress: Callable[[int, int], None] | None = None
+) -> Rehearsal:
+    """Fly the plan in batched simulation with noise and faults; `.require()` refuses what did not pass.
+
+    runs: in place of the mission's `rehearse.runs`.
+    """
+    return rehearsals.rehearse(
+        flight.planned.plan, flight.mission, flight.vehicle, plugins.simulator(), runs=runs, progress=progress
+    )
+
+
+def fly(
+    flight: PreparedFlight,
+    rehearsal: Rehearsal | None = None,
+    options: FlightOptions | None = None,
+    *,
+    log_folder: Path | None = None,
+    progress: Progress | None = None,
+) -> FlownMission:
+    """Fly a plan that was rehearsed, log it and write its review page.
+
+    rehearsal: of this plan; made here where it is None.
+    log_folder: in place of the mission's `log.dir`.
+
+    Raises:
+        InputError: the link or the endpoint is wrong.
+        RefusedError: the rehearsal did not pass, or log folder, link or pose source are not to be had. What is refused
+            after connecting is in the result.
+    """
+    rehearsal = rehearse(flight) if rehearsal is None else rehearsal
+    rehearsal.require()
+    options = options or FlightOptions()
+    started = datetime.datetime.now(datetime.UTC).astimezone()
+    path = log_path(log_folder or flight.mission.log.dir, flight.mission.name, started)
+    header = _header(flight, rehearsal, options, started)
+    try:
+        writer = LogWriter(path, header)
+    except OSError as error:
+        raise RefusedError(f"cannot write the flight log {path}: {error.strerror}; choose --log DIR") from error
+    thread = LogThread(writer, lossless=options.fast)
+    try:
+        result = run_flight(
+            flight.mission, flight.planned.plan, flight.vehicle, options, observers=(thread,), progress=progress
+        )
+    finally:
+        thread.close()
+    log = read_log(path)
+    report = write_page(log, path.with_suffix(".html"))
+    return FlownMission(result, figures_of(log), path, thread.statistics, report)
+
+
+def _header(
+    flight: PreparedFlight, rehearsal: Rehearsal, options: FlightOptions, started: datetime.datetime
+) -> FlightHeader:
+    """What the log says of the flight before it begins."""
+    mission = flight.mission
+    return FlightHeader(
+        name=mission.name,
+        mission_text=mission.source.text,
+        plan=flight.planned.plan,
+        vehicle=flight.vehicle,
+        limits=mission.safety_limits(),
+        link=options.uri or mission.vehicle.uri,
+        seed=mission.seed,
+        started=started,
+        planner=mission.planner.type,
+        model_card=flight.model_card,
+        predicted_max_error_m=rehearsal.max_error_m,
+        notes={"rehearsal": rehearsal.text},
+    )

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -33,7 +34,8 @@ from lcd_flight.model import (
 )
 from lcd_flight.model.frames import from_yaw, multiply, normalized
 from lcd_flight.model.types import Quaternion, Vector3
-from lcd_flight.record import FlightHeader
+from lcd_flight.record import FlightHeader, FlightLog
+from lcd_flight.record.flight_log import findings_of, series_of
 from lcd_flight.worlds import load_vehicle
 
 TICK_NS = 10_000_000
@@ -133,6 +135,17 @@ def flight(offset: Offset | None = None, *, end: Sequence[Phase] = (Phase.LANDED
 def with_finding(pairs: list[Pair], first: int, last: int, finding: Finding) -> list[Pair]:
     """The same flight with a finding from one tick to another, both included."""
     return [(i, replace(t, findings=(*t.findings, finding)) if first <= t.sequence <= last else t) for i, t in pairs]
+
+
+def log_of(pairs: list[Pair], **changes: object) -> FlightLog:
+    """What reading the log of these ticks gives, without a file."""
+    return FlightLog(
+        path=Path("synthetic.mcap"),
+        header=header(**changes),
+        series=series_of(pairs),
+        findings=findings_of([tick for _, tick in pairs]),
+        complete=True,
+    )
 
 
 def _pair(sequence: int, phase: Phase, leg: int, leg_time_s: float, reference: Reference | None, away: Vector3) -> Pair:

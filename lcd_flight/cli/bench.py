@@ -12,7 +12,7 @@ import typer
 
 from lcd_flight.cli.options import Json, NoColor, Quiet
 from lcd_flight.cli.terminal import Terminal
-from lcd_flight.model.errors import InputError, Outcome
+from lcd_flight.errors import InputError, Outcome
 
 FOLDER = Path(__file__).parents[2] / "benchmarks"
 

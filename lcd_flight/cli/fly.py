@@ -10,7 +10,7 @@ import typer
 from lcd_flight.cli.mission import MissionArgument, plan_facts, tell_plan
 from lcd_flight.cli.options import Json, NoColor, Quiet
 from lcd_flight.cli.terminal import Terminal
-from lcd_flight.model.errors import InputError, Outcome
+from lcd_flight.errors import InputError, Outcome
 
 if TYPE_CHECKING:
     from lcd_flight.api import FlownMission, PreparedFlight

@@ -9,7 +9,7 @@ import typer
 
 from lcd_flight.cli.options import Json, NoColor, Quiet
 from lcd_flight.cli.terminal import Terminal, following
-from lcd_flight.model.errors import InputError, Outcome
+from lcd_flight.errors import InputError, Outcome
 
 Seed = Annotated[int, typer.Option(help="Of tasks, perturbations and noise.", min=0)]
 

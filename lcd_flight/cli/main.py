@@ -13,7 +13,7 @@ from typer.exceptions import TyperException
 
 from lcd_flight.cli import bench, evaluation, fly, learning, mission, review
 from lcd_flight.cli.terminal import Terminal
-from lcd_flight.model.errors import LcdError, Outcome
+from lcd_flight.errors import LcdError, Outcome
 
 INTERRUPTED = "interrupted; run the same command again to go on"
 

@@ -9,7 +9,7 @@ import typer
 
 from lcd_flight.cli.options import Json, NoColor, Quiet
 from lcd_flight.cli.terminal import Terminal
-from lcd_flight.model.errors import Outcome
+from lcd_flight.errors import Outcome
 
 if TYPE_CHECKING:
     from lcd_flight.api import PreparedFlight

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from lcd_flight.model.errors import Outcome
+from lcd_flight.errors import Outcome
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -1,6 +1,6 @@
 """The shared vocabulary. Imports numpy and nothing else; everything in the project may import it."""
 
-from lcd_flight.model.errors import InputError, LcdError, Outcome, RefusedError
+from lcd_flight.errors import InputError, LcdError, Outcome, RefusedError
 from lcd_flight.model.finding import Finding, Severity
 from lcd_flight.model.limits import Geofence, SafetyLimits
 from lcd_flight.model.phase import Phase

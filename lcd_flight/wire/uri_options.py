@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import msgspec
 
-from lcd_flight.model.errors import InputError
+from lcd_flight.errors import InputError
 
 Options = TypeVar("Options", bound=msgspec.Struct)
 

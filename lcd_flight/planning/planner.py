@@ -131,7 +131,7 @@ def plan_batch(
     """
     step = max(1, _BLOCK_SEGMENTS // max(1, durations_s.shape[1]))
     parts = []
-    for first in range(0, len(tasks), step):
+    for first in range(0, max(1, len(tasks)), step):
         rows = slice(first, first + step)
         parts.append(_plan(Whitening.of(tasks.poses[rows], durations_s[rows]), cost, options))
         if progress is not None:

@@ -146,7 +146,7 @@ def _read(path: Path) -> tuple[Tensors, dict[str, Any]]:
         raise InputError(f"{path}: there is no such model file") from None
     except (SafetensorError, OSError, ValueError) as error:
         raise InputError(f"{path}: not a readable model file ({error}); copy it again") from None
-    return tensors, about
+    return tensors, about if isinstance(about, dict) else {}
 
 
 def _model(path: Path, tensors: Tensors, about: Mapping[str, Any]) -> CostModel:

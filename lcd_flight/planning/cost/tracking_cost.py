@@ -112,19 +112,17 @@ class CostModel:
 
     def out_of_range(self, durations_s: FloatArray, coefficients: FloatArray) -> tuple[str | None, ...]:
         """For each plan None, or by what it leaves what the networks were trained on most."""
-        features = segment_features(durations_s, coefficients)
-        middle, half = 0.5 * (self.feature_low + self.feature_high), 0.5 * (self.feature_high - self.feature_low)
-        excess = np.nan_to_num(np.abs(features - middle) / half, nan=np.inf)
-        worst = excess.reshape(len(features), -1).argmax(axis=1)
-        segments, columns = np.unravel_index(worst, features.shape[1:])
-        return tuple(
-            self._excess(int(s), int(c), float(features[n, s, c])) if excess[n, s, c] > 1.0 else None
-            for n, (s, c) in enumerate(zip(segments, columns, strict=True))
-        )
+        return tuple(self._excess(features) for features in segment_features(durations_s, coefficients))
 
-    def _excess(self, segment: int, column: int, value: float) -> str:
-        low, high = self.feature_low[column], self.feature_high[column]
-        return f"{FEATURE_NAMES[column]} of segment {segment + 1} is {value:.3g}, trained on {low:.3g} to {high:.3g}"
+    def _excess(self, features: FloatArray) -> str | None:
+        """What of features (S, F) is farthest out, in units of the range; None where all is inside."""
+        low, high = self.feature_low, self.feature_high
+        out = np.abs(features - 0.5 * (low + high)) / (0.5 * (high - low))
+        segment, column = np.unravel_index(np.nan_to_num(out, nan=np.inf).argmax(), out.shape)
+        if out[segment, column] <= 1.0:
+            return None
+        value, bounds = features[segment, column], f"{low[column]:.3g} to {high[column]:.3g}"
+        return f"{FEATURE_NAMES[column]} of segment {segment + 1} is {value:.3g}, trained on {bounds}"
 
     def _normalised(self, features: FloatArray) -> Array:
         with np.errstate(over="ignore", invalid="ignore"):  # judged by the caller, as values that are not finite

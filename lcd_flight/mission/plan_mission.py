@@ -63,11 +63,12 @@ def plan_mission(mission: Mission, vehicle: Vehicle, cost: TrackingCost | None =
         InputError: the model is missing, damaged, or made for another vehicle or loop.
         RefusedError: the planned path leaves the geofence, breaks `planner.limits` or outlasts the battery.
     """
+    tasks = trajectory_tasks(mission)
     if mission.planner.type == "minimum-snap":
         cost = None
-    elif cost is None:
+    elif cost is None and tasks:
         cost = load_cost(mission, vehicle)
-    made = [_plan(task, mission, vehicle, cost) for task in trajectory_tasks(mission)]
+    made = [_plan(task, mission, vehicle, cost) for task in tasks]
     plan = flight_plan(mission, [planned for planned, _ in made])
     require_flyable(plan, mission, vehicle)
     return PlannedMission(plan, tuple(summary for _, summary in made))

@@ -110,13 +110,17 @@ class Whitening:
         grad_z = np.empty(self.z_shape)
         grad_retimed = np.array(grad_durations, dtype=np.float64)
         arrays = (self.waypoints, retimed, self.factored, self._shifts(z))
-        grads = (np.ascontiguousarray(grad_coefficients), grad_retimed, grad_z.reshape(len(self), -1, AXES))
+        grads = (
+            np.ascontiguousarray(grad_coefficients),
+            grad_retimed,
+            grad_z.reshape(len(self), self.factored.shape[1], AXES),
+        )
         _kernel(_pullback)(*arrays, *grads)
         return grad_z * self.scales[:, None, None, :], retime_pullback(retimed, theta, grad_retimed)
 
     def _shifts(self, z: FloatArray) -> FloatArray:
         """s z as columns, (N, 3 (S - 1), 4)."""
-        return np.asarray(z * self.scales[:, None, None, :]).reshape(len(self), -1, AXES)
+        return np.asarray(z * self.scales[:, None, None, :]).reshape(len(self), self.factored.shape[1], AXES)
 
 
 _COMPILER = Compiler(*KERNEL_SOURCES, Path(__file__), error_model="numpy", nogil=True)

@@ -198,7 +198,7 @@ class _Objective:
         weights = np.full(self.size, self._options.snap_weight)
         weights[self._z_size :] *= 0.5
         value = self._options.cost_weight * cost + (variables**2) @ weights
-        grad = np.concatenate([grad_z.reshape(len(variables), -1), grad_theta], axis=1)
+        grad = np.concatenate([grad_z.reshape(len(variables), self._z_size), grad_theta], axis=1)
         grad = self._options.cost_weight * grad + 2.0 * weights * variables
         if self._options.timing == "fixed":
             grad[:, self._z_size :] = 0.0

@@ -22,8 +22,8 @@ lint: $(VENV)/.developing ## style, types and import contracts
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: $(VENV)/.benching ## measure against the peers, which this installs: make bench NAME=rollouts
-	$(BIN)/lcd bench $(NAME)
+bench: $(VENV)/.benching ## measure against the peers, which this installs, and write BENCHMARKS.md; one alone: NAME=rollouts
+	$(if $(NAME),$(BIN)/lcd bench $(NAME),$(BIN)/python -m benchmarks.report)
 
 campaign: $(VENV)/.developing ## long comparisons; dated results land in docs/campaigns
 	$(BIN)/python -m benchmarks.campaign

@@ -19,8 +19,8 @@ PAGE = ROOT / "BENCHMARKS.md"
 HEAD = """# Benchmarks
 
 Written by `make bench` on {date}: {machine}, Python {python}. Both sides of each ratio were measured in the same
-run on this machine; above 1 means that ours is better. `make bench NAME=plan` measures one table again. Absolute figures differ
-between machines, and here they share two cores with everything else that runs; ratios travel better.
+run on this machine; above 1 means that ours is better. `make bench NAME=plan` measures one table again. Absolute
+figures differ between machines, and here they share two cores with everything else that runs; ratios travel better.
 """
 
 

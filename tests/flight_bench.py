@@ -144,10 +144,14 @@ def fly(
     orders: Mapping[int, tuple[Command, ...]] | None = None,
     ticks: int = 3000,
     linger: int = 5,
+    mass_share: float = 1.0,
 ) -> Flight:
-    """Fly until it is over and `linger` ticks more. Faults and orders are given ticks since take-off."""
+    """Fly until it is over and `linger` ticks more. Faults and orders are given ticks since take-off.
+
+    mass_share: real mass over the mass that is believed.
+    """
     flown = flown or setup()
-    vehicle, memory, flight = PointMass(flown.vehicle.mass_kg), Memory(), Flight()
+    vehicle, memory, flight = PointMass(mass_share * flown.vehicle.mass_kg), Memory(), Flight()
     for sequence in range(ticks):
         after = sequence - TAKEOFF_TICK
         commands = (*ORDERS.get(sequence, ()), *(orders or {}).get(after, ()))

@@ -1,11 +1,24 @@
-"""The state that a tick counts with: measured, or predicted over a short gap in the pose. Pure."""
+"""What a tick counts with: the state, measured or predicted over a short gap, and the hover thrust. Pure."""
 
 from __future__ import annotations
 
 from lcd_flight.flight.setup import FlightSetup, Memory
-from lcd_flight.model import GRAVITY_M_PER_S2, AttitudeThrust, State, TickInputs, Vehicle
+from lcd_flight.model import (
+    GRAVITY_M_PER_S2,
+    AttitudeThrust,
+    Phase,
+    Reference,
+    State,
+    TickInputs,
+    Vehicle,
+)
 from lcd_flight.model.frames import body_z_axis
 from lcd_flight.safety.evidence import SafetyMemory, pose_seen
+
+HOVER_SMOOTHING_S = 1.0
+"""Time constant of the hover thrust."""
+HOVER_SHARES = (0.85, 1.15)
+"""Of the weight: how far the hover thrust is believed to be from it."""
 
 
 def estimate(inputs: TickInputs, setup: FlightSetup, memory: Memory, dt_s: float) -> tuple[State | None, SafetyMemory]:
@@ -35,3 +48,19 @@ def predicted(state: State, setpoint: AttitudeThrust, vehicle: Vehicle, dt_s: fl
         q_WB=setpoint.q_WB,
         w_WB_B=(0.0, 0.0, 0.0),
     )
+
+
+def hover_thrust_N(
+    memory: Memory, setpoint: AttitudeThrust | None, reference: Reference | None, vehicle: Vehicle, dt_s: float
+) -> float | None:
+    """The thrust that carries this vehicle, learned while the plan is followed; before that None.
+
+    A battery that sags and a thrust map that is a little wrong make it differ from the weight by more than a level
+    descent is below it. The vertical part of the thrust asked for, less what the plan's own acceleration takes.
+    """
+    if memory.phase not in (Phase.HOLD, Phase.TRACK) or setpoint is None or reference is None:
+        return memory.hover_N
+    seen_N = setpoint.thrust_N * body_z_axis(setpoint.q_WB)[2] - vehicle.mass_kg * reference.a_W[2]
+    before_N = vehicle.weight_N if memory.hover_N is None else memory.hover_N
+    now_N = before_N + dt_s / (HOVER_SMOOTHING_S + dt_s) * (seen_N - before_N)
+    return min(max(now_N, HOVER_SHARES[0] * vehicle.weight_N), HOVER_SHARES[1] * vehicle.weight_N)

@@ -13,8 +13,8 @@ from lcd_flight.safety.fence import STOPPING_DECELERATION
 
 DESCENT_SPEED = 0.4
 """m/s, of a landing under position control."""
-PRESS_DEPTH_M = 0.3
-"""How far below the ground a landing's reference goes on, so that the vehicle is pressed down and seen to stand."""
+PRESS_DEPTH_M = 0.5
+"""How far below the ground a landing's reference goes on, so that thrust falls off and the vehicle is seen to stand."""
 RETURN_SPEED = 1.0
 """m/s, peak of the way back to an interrupted leg."""
 BLIND_ACCELERATION = 0.5
@@ -62,9 +62,9 @@ def go_to(start: State, target: FloatArray) -> Trajectory:
     return Trajectory(np.array([duration_s]), coefficients[:, None, :])
 
 
-def blind_setpoint(vehicle: Vehicle, yaw_rad: float) -> AttitudeThrust:
-    """Level, with the last known heading, slightly below hover thrust."""
-    return AttitudeThrust(vehicle.weight_N - vehicle.mass_kg * BLIND_ACCELERATION, from_yaw(yaw_rad))
+def blind_setpoint(vehicle: Vehicle, hover_N: float, yaw_rad: float) -> AttitudeThrust:
+    """Level, with the last known heading, slightly below the thrust `hover_N` at which this flight hovers."""
+    return AttitudeThrust(hover_N - vehicle.mass_kg * BLIND_ACCELERATION, from_yaw(yaw_rad))
 
 
 def blind_time_s(height_m: float, climb_speed: float) -> float:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from lcd_flight.flight.manoeuvres import go_to, land_from, stop
 from lcd_flight.flight.phases import OF_LEG, Event
-from lcd_flight.flight.setup import FlightSetup, Route
+from lcd_flight.flight.setup import FlightSetup, Memory, Route
 from lcd_flight.model import Finding, Leg, Phase, Reference, Severity, State, Vector3
 
 SMOOTHING_S = 0.2
@@ -20,17 +20,19 @@ SETTLED_S = 0.5
 SETTLE_LIMIT_S = 5.0
 """A leg that has not settled by then is left with a warning."""
 TOUCHDOWN_S = 0.3
-"""Standing for so long although told to go down is touchdown."""
-TOUCHDOWN_DEPTH_M = 0.15
-"""How far the reference must be below a vehicle that stands."""
+"""Standing for so long on too little thrust to hover is touchdown."""
+TOUCHDOWN_THRUST_SHARE = 0.8
+"""Of the thrust at which this flight hovers: in the air it would be 0.6 m/s fast after the time above."""
 BLIND_TOUCHDOWN_M = 0.1
-"""Height above the ground below which a vehicle that stands has landed, in a descent without reference."""
+"""Height above the ground below which a vehicle that stands has landed, where thrust is constant and tells nothing."""
 
 ON_THE_WAY = frozenset({Phase.TAKEOFF, Phase.HOLD, Phase.TRACK})
+GOING_DOWN = frozenset({Phase.LAND, Phase.LAND_NOW, Phase.DESCEND_BLIND})
 
 
-def moved_on(route: Route, state: State | None, dt_s: float) -> tuple[Route, Reference | None]:
+def moved_on(memory: Memory, setup: FlightSetup, state: State | None, dt_s: float) -> tuple[Route, Reference | None]:
     """The route one step later, and where the vehicle should be now; None where nothing is followed."""
+    route = memory.route
     time_s = route.path_time_s + dt_s
     reference = None if route.path is None else route.path.reference(time_s)
     v_smooth_W = _smoothed(route.v_smooth_W, state, dt_s)
@@ -43,10 +45,19 @@ def moved_on(route: Route, state: State | None, dt_s: float) -> tuple[Route, Ref
         path_time_s=time_s,
         on_leg=route.on_leg,
         calm_s=route.calm_s + dt_s if still and near else 0.0,
-        still_s=route.still_s + dt_s if still else 0.0,
+        grounded_s=route.grounded_s + dt_s if still and _is_carried(memory, setup, state) else 0.0,
         v_smooth_W=v_smooth_W,
     )
     return moved, reference
+
+
+def _is_carried(memory: Memory, setup: FlightSetup, state: State | None) -> bool:
+    """Whether something else than thrust must carry a vehicle that stands still."""
+    if memory.setpoint is None or state is None:
+        return False
+    if memory.phase is Phase.DESCEND_BLIND:
+        return state.p_WB[2] - setup.ground_z_m < BLIND_TOUCHDOWN_M
+    return memory.setpoint.thrust_N < TOUCHDOWN_THRUST_SHARE * (memory.hover_N or setup.vehicle.weight_N)
 
 
 def next_leg(route: Route, setup: FlightSetup, phase: Phase) -> tuple[Event | None, tuple[Finding, ...]]:
@@ -66,15 +77,9 @@ def next_leg(route: Route, setup: FlightSetup, phase: Phase) -> tuple[Event | No
     return Event.LAND if following is None else OF_LEG[following.kind], findings
 
 
-def touched_down(
-    route: Route, setup: FlightSetup, phase: Phase, state: State | None, reference: Reference | None
-) -> bool:
-    """Whether the vehicle stands although it is told to go down."""
-    if state is None or route.still_s < TOUCHDOWN_S:
-        return False
-    if phase in (Phase.LAND, Phase.LAND_NOW):
-        return reference is not None and state.p_WB[2] - reference.p_W[2] > TOUCHDOWN_DEPTH_M
-    return phase is Phase.DESCEND_BLIND and state.p_WB[2] - setup.ground_z_m < BLIND_TOUCHDOWN_M
+def touched_down(route: Route, phase: Phase) -> bool:
+    """Whether a vehicle that is to land stands on something."""
+    return phase in GOING_DOWN and route.grounded_s >= TOUCHDOWN_S
 
 
 def begun(route: Route, setup: FlightSetup, before: Phase, phase: Phase, state: State) -> Route:
@@ -87,7 +92,7 @@ def begun(route: Route, setup: FlightSetup, before: Phase, phase: Phase, state: 
         return replace(route, path=land_from(state, setup.lowest_z_m), path_time_s=0.0, on_leg=False)
     if phase is Phase.HOLD:
         return _way_back(route, setup, state)
-    return replace(route, path=None, path_time_s=0.0, on_leg=False, still_s=0.0)
+    return replace(route, path=None, path_time_s=0.0, on_leg=False)
 
 
 def _leg_begun(route: Route, setup: FlightSetup) -> Route:

@@ -47,6 +47,8 @@ class FlightSetup:
     law: ControlLaw
     paths: tuple[Trajectory, ...]
     """Of each leg, as flown: a landing goes on to below the ground."""
+    lowest_planned_z_m: float
+    """Of the plan's start and its landings."""
     monitors: tuple[Monitor, ...]
     gate: GateLimits
 
@@ -56,7 +58,8 @@ class FlightSetup:
     ) -> FlightSetup:
         """Derive paths, monitors and gate."""
         paths = tuple(pressed_down(g.trajectory) if g.kind is LegKind.LAND else g.trajectory for g in plan.legs)
-        return FlightSetup(plan, vehicle, limits, law, paths, monitors(limits), GateLimits.of(vehicle))
+        lowest_m = min(float(g.trajectory.waypoints()[:, 2].min()) for g in plan.legs)
+        return FlightSetup(plan, vehicle, limits, law, paths, lowest_m, monitors(limits), GateLimits.of(vehicle))
 
     @property
     def ground_z_m(self) -> float:
@@ -84,8 +87,8 @@ class Route:
     """Whether the path is the leg's own."""
     calm_s: float = 0.0
     """For how long the vehicle has stood still at the reference."""
-    still_s: float = 0.0
-    """For how long it has not moved, wherever the reference is."""
+    grounded_s: float = 0.0
+    """For how long it has stood still although its thrust does not carry it."""
     v_smooth_W: Vector3 = (0.0, 0.0, 0.0)
     """m/s, velocity with noise averaged out."""
 
@@ -106,6 +109,8 @@ class Memory:
     invalid_commands: int = 0
     """Control steps in a row that were not finite."""
     saturated: bool = False
+    hover_N: float | None = None
+    """Thrust at which this flight hovers, as seen so far; None before the first hold."""
     blind_s: float = 0.0
     """Time given to a descent without pose."""
     route: Route = field(default_factory=Route)

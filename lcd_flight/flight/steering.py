@@ -31,7 +31,7 @@ def steer(
     """The setpoint of this tick, behind the gate; none where motors are not to turn."""
     known = state or memory.state
     yaw_rad = 0.0 if known is None else yaw_of(known.q_WB)
-    level = blind_setpoint(setup.vehicle, yaw_rad)
+    level = blind_setpoint(setup.vehicle, memory.hover_N or setup.vehicle.weight_N, yaw_rad)
     if phase is Phase.ARMED:
         return Steering(AttitudeThrust(0.0, from_yaw(yaw_rad)))
     if not phase.airborne:

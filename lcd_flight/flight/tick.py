@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from lcd_flight.flight.estimate import estimate
+from lcd_flight.flight.estimate import estimate, hover_thrust_N
 from lcd_flight.flight.manoeuvres import blind_time_s
 from lcd_flight.flight.phases import OF_COMMAND, OF_SEVERITY, TIME_LIMITS_S, Event, advance
 from lcd_flight.flight.route import begun, moved_on, next_leg, touched_down
@@ -48,14 +48,14 @@ def tick(inputs: TickInputs, setup: FlightSetup, memory: Memory) -> tuple[Tick, 
     """Decide one control step. Equal arguments give equal results, to the bit."""
     dt_s = _step_s(inputs, memory)
     state, safety = estimate(inputs, setup, memory, dt_s)
-    route, reference = moved_on(memory.route, state, dt_s)
+    route, reference = moved_on(memory, setup, state, dt_s)
     judged, safety = _judged(inputs, setup, memory, safety, state, reference)
     leg_event, waits = next_leg(route, setup, memory.phase)
     findings = (*judged, *waits, *_orders(inputs), *_expiry(inputs, memory))
     events = _events(inputs, findings)
     if leg_event is not None:
         events.append(leg_event)
-    if touched_down(route, setup, memory.phase, state, reference):
+    if touched_down(route, memory.phase):
         events.append(Event.TOUCHDOWN)
     phase = advance(memory.phase, events)
     known = state or memory.state
@@ -74,7 +74,7 @@ def tick(inputs: TickInputs, setup: FlightSetup, memory: Memory) -> tuple[Tick, 
         reference=reference,
         setpoint=steering.setpoint,
         motors=_motors(memory.phase, phase),
-        position_error_W=_error(state, reference),
+        position_error_W=_error(state, reference, setup),
         saturated=limited,
         findings=(*findings, *steering.findings),
     )
@@ -96,7 +96,7 @@ def _judged(
     reference: Reference | None,
 ) -> tuple[tuple[Finding, ...], SafetyMemory]:
     """What the monitors find, in the phase that the tick before left behind."""
-    error_W = _error(state, reference)
+    error_W = _error(state, reference, setup)
     evidence, safety = gather(
         inputs,
         safety,
@@ -151,11 +151,12 @@ def _motors(before: Phase, phase: Phase) -> MotorRequest:
     return MotorRequest.DISARM if on_ground and (before.airborne or before is Phase.ARMED) else MotorRequest.NONE
 
 
-def _error(state: State | None, reference: Reference | None) -> Vector3 | None:
+def _error(state: State | None, reference: Reference | None, setup: FlightSetup) -> Vector3 | None:
+    """Position minus reference in m; a reference that presses down to below the ground counts as on it."""
     if state is None or reference is None:
         return None
     (x, y, z), (rx, ry, rz) = state.p_WB, reference.p_W
-    return (x - rx, y - ry, z - rz)
+    return (x - rx, y - ry, z - max(rz, setup.lowest_planned_z_m))
 
 
 def _remembered(
@@ -180,6 +181,7 @@ def _remembered(
         integral=steering.integral,
         invalid_commands=steering.invalid_commands,
         saturated=decided.saturated,
+        hover_N=hover_thrust_N(memory, decided.setpoint, decided.reference, setup.vehicle, decided.dt_s),
         blind_s=blind_s,
         route=route,
         safety=safety,

@@ -76,7 +76,7 @@ class Tick:
     """As transmitted, behind the gate; None where nothing is sent."""
     motors: MotorRequest
     position_error_W: Vector3 | None
-    """Position minus reference in m."""
+    """Position minus reference in m; a reference that presses down to below the ground counts as on it."""
     saturated: bool
     """Whether a motor, or the thrust command, was at its limit."""
     findings: tuple[Finding, ...] = ()

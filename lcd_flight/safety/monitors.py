@@ -18,6 +18,9 @@ from lcd_flight.safety.fence import stopping_margin_m
 VEHICLE_CRASHED = "vehicle_crashed"
 """Code of the finding that is adopted rather than reacted to."""
 
+_FEW_PACKETS_S = 0.5
+"""A share of a handful of packets says nothing; by then there are some."""
+
 Measure = Callable[[Evidence], "float | None"]
 
 
@@ -154,8 +157,8 @@ def _link(limits: SafetyLimits) -> tuple[Monitor, ...]:
         Monitor("link_age", age, _link_age_s, limits.link_timeout_s, Severity.BRAKE, silent, 1e3),
         Monitor("link_lost", age, _link_age_s, 1.0, Severity.LAND, silent, 1e3, scope=Scope.ARMED),
         Monitor("link_loss", loss, _loss_share, 0.10, Severity.WARN, lossy, 100.0, scope=Scope.ARMED),
-        Monitor("link_loss_high", loss, _loss_share, 0.15, Severity.BRAKE, lossy, 100.0),
-        Monitor("link_loss_severe", loss, _loss_share, 0.25, Severity.LAND, lossy, 100.0),
+        Monitor("link_loss_high", loss, _loss_share, 0.15, Severity.BRAKE, lossy, 100.0, debounce_s=_FEW_PACKETS_S),
+        Monitor("link_loss_severe", loss, _loss_share, 0.25, Severity.LAND, lossy, 100.0, debounce_s=_FEW_PACKETS_S),
     )  # fmt: skip
 
 

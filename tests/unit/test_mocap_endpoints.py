@@ -105,6 +105,16 @@ def test_a_flood_is_taken_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     assert max(b - a for a, b in itertools.pairwise(counts)) <= 3
 
 
+def test_closing_takes_the_socket_out_of_the_event_loop() -> None:
+    async def main() -> None:
+        async with open_source("tcp://127.0.0.1:9", "cf1", CLOCK, PoseOptions()) as source:
+            assert source._socket is not None
+            descriptor = source._socket.fileno()
+        assert not asyncio.get_running_loop().remove_reader(descriptor)
+
+    asyncio.run(main())
+
+
 def test_the_loopback_is_deterministic_in_virtual_time() -> None:
     def flight() -> list[PoseReport]:
         clock, reports = VirtualClock(), []

@@ -116,6 +116,7 @@ def test_the_rate_counts_whole_tenths_of_the_last_second() -> None:
     for n in range(300):
         arrivals = counted_at(arrivals, n * 10 * MS)
     assert rate_hz(arrivals, 3 * SECOND) == 100.0
+    assert rate_hz(arrivals, 3 * SECOND - 30 * MS) == 100.0  # the tenth that has begun is left out
     assert rate_hz(arrivals, 3 * SECOND + 500 * MS) == 50.0
     assert rate_hz(arrivals, 5 * SECOND) == 0.0
     assert len(arrivals) <= 11

@@ -21,7 +21,7 @@ CONTEXT: Any = object()
 @pytest.fixture
 def more_links(monkeypatch: pytest.MonkeyPatch) -> None:
     """Links that a third party might add."""
-    monkeypatch.setattr(links, "names", lambda group: ["mavlink+udp", "radio", "sim"])
+    monkeypatch.setattr(links, "names", lambda group: ["mavlink", "mavlink+udp", "radio", "sim"])
 
 
 @pytest.mark.parametrize(

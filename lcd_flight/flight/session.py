@@ -127,7 +127,8 @@ async def _opened(
     publisher = pose_publisher(endpoint) if simulated else None
     if publisher is not None:
         stack.callback(publisher.close)
-    source = pose_source(endpoint, capture.rigid_body, clock, PoseOptions(axes=capture.frame))
+    axes = "enu" if simulated else capture.frame  # a simulated vehicle publishes in our own axes
+    source = pose_source(endpoint, capture.rigid_body, clock, PoseOptions(axes=axes))
     pose = await stack.enter_async_context(source)
     context = LinkContext(
         vehicle=vehicle,
@@ -136,6 +137,7 @@ async def _opened(
         initial_yaw_rad=plan.start_yaw_rad,
         seed=mission.seed,
         publish_pose=publisher,
+        rigid_body=capture.rigid_body,
     )
     return pose, await stack.enter_async_context(open_link(uri, context))
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -98,7 +99,8 @@ class Dataset:
             partial.replace(path)
             _sync(self.folder)
         except OSError as error:
-            partial.unlink(missing_ok=True)
+            with suppress(OSError):
+                partial.unlink()
             raise InputError(f"{path}: cannot be written ({error}); give another folder or make room") from error
 
     def _checked(self, path: Path, number: int) -> ShardHeader:

@@ -94,7 +94,7 @@ def learned(problem: Problem) -> Planned:
 
 
 def search(problem: Problem) -> Planned:
-    """The cross-entropy method in the simulator from minimum snap, 320 rollouts a task: what learning is held against."""
+    """CEM in the simulator from minimum snap, 320 rollouts a task: what learning is held against."""
     space = Whitening.of(problem.tasks.poses, problem.durations_s)
     options = RolloutOptions(loop=problem.world.loop, start_aligned=problem.world.start_aligned)
     found = search_in_simulator(

@@ -9,6 +9,7 @@ training goes on where it stopped. The networks are trained from scratch in each
 from __future__ import annotations
 
 import shutil
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -165,5 +166,6 @@ def _copy(source: Path, out: Path) -> None:
         shutil.copyfile(source, partial)
         partial.replace(out)
     except OSError as error:
-        partial.unlink(missing_ok=True)
+        with suppress(OSError):
+            partial.unlink()
         raise InputError(f"{out}: cannot be written ({error}); give another place") from error

@@ -148,7 +148,7 @@ def plan_task(
 
 def _plan(whitening: Whitening, cost: TrackingCost, options: PlannerOptions) -> PlanResult:
     """Solve, then judge every row."""
-    objective = _Objective(whitening, cost, options)
+    objective = PlanObjective(whitening, cost, options)
     descent = descend(objective, np.zeros((len(whitening), objective.size)), options.iterations, options.step)
     z, theta = objective.unpack(descent.best)
     found, minimum = whitening.plan(z, theta), whitening.minimum
@@ -177,7 +177,7 @@ def _plan(whitening: Whitening, cost: TrackingCost, options: PlannerOptions) -> 
     )
 
 
-class _Objective:
+class PlanObjective:
     """What a descent lowers: variables are z, flattened, then theta, for each row."""
 
     def __init__(self, whitening: Whitening, cost: TrackingCost, options: PlannerOptions) -> None:

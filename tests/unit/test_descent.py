@@ -29,6 +29,18 @@ def test_the_first_step_has_the_size_given_in_every_variable() -> None:
     assert found.best_iteration.tolist() == [1]
 
 
+def test_steps_shrink_along_a_cosine() -> None:
+    visited: list[float] = []
+
+    def slope(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        visited.append(float(x[0, 0]))
+        return x[:, 0].copy(), np.ones_like(x)
+
+    descend(slope, np.zeros((1, 1)), iterations=10, step=0.1)
+    wanted = 0.05 * (1.0 + np.cos(np.pi * np.arange(10) / 10))
+    np.testing.assert_allclose(-np.diff(visited), wanted, rtol=1e-6)
+
+
 def test_a_start_that_cannot_be_bettered_is_kept() -> None:
     found = descend(bowl, CENTRES.copy(), iterations=10, step=0.1)
     assert np.array_equal(found.best, CENTRES)
@@ -55,6 +67,7 @@ def test_a_row_that_breaks_is_told_and_stops_alone() -> None:
     def breaking(x: FloatArray) -> tuple[FloatArray, FloatArray]:
         nonlocal calls
         calls += 1
+        assert np.isfinite(x).all()
         value, grad = bowl(x)
         if calls > 3:
             value[1] = np.inf

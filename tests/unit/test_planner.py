@@ -11,8 +11,17 @@ import pytest
 
 from lcd_flight.model import FloatArray, InputError, Tasks, Trajectories
 from lcd_flight.planning.cost.proxy import ThrustProxy
+from lcd_flight.planning.knots import Whitening
 from lcd_flight.planning.minimum_snap import minimum_snap_batch, snap
-from lcd_flight.planning.planner import ErrorPredictor, PlannerOptions, PlanResult, TrackingCost, plan_batch, plan_task
+from lcd_flight.planning.planner import (
+    ErrorPredictor,
+    PlannerOptions,
+    PlanObjective,
+    PlanResult,
+    TrackingCost,
+    plan_batch,
+    plan_task,
+)
 
 COST = cost_models.thrust_model()
 SPEED = 2.4
@@ -31,8 +40,11 @@ def plan(tasks: Tasks, cost: TrackingCost = COST, **options: Any) -> PlanResult:
     return plan_batch(tasks, tasks.durations_s(SPEED), cost, PlannerOptions(**options))
 
 
-def objective(result: PlanResult, row: int) -> float:
-    return float(result.cost[row] + 0.1 * (result.z[row] ** 2).sum() + 0.05 * (result.theta[row] ** 2).sum())
+def objective(tasks: Tasks, z: FloatArray, theta: FloatArray, cost: TrackingCost = COST) -> FloatArray:
+    """(N,) what the planner says it lowers, with its default weights."""
+    plans = Whitening.of(tasks.poses, tasks.durations_s(SPEED)).plan(z, theta)
+    value, _, _ = cost.value_and_gradient(plans.durations_s, plans.coefficients)
+    return value + 0.1 * (z**2).sum(axis=(1, 2, 3)) + 0.05 * (theta**2).sum(axis=1)
 
 
 def knots(plans: Trajectories) -> FloatArray:
@@ -42,12 +54,28 @@ def knots(plans: Trajectories) -> FloatArray:
 @pytest.mark.parametrize("timing", ["fixed", "retimed"])
 @pytest.mark.parametrize("cost", [COST, ThrustProxy()], ids=["learned", "analytic"])
 def test_plans_cost_less_than_minimum_snap(cost: TrackingCost, timing: str) -> None:
-    result = plan(some_tasks(20), cost, timing=timing)
+    tasks = some_tasks(20)
+    result = plan(tasks, cost, timing=timing)
     assert result.fallback == (None,) * 20
     assert np.all(result.cost < result.minimum_snap_cost)
-    assert all(objective(result, row) < result.minimum_snap_cost[row] for row in range(20))
+    assert np.all(objective(tasks, result.z, result.theta, cost) < result.minimum_snap_cost)
     again, _, _ = cost.value_and_gradient(result.plans.durations_s, result.plans.coefficients)
     np.testing.assert_allclose(result.cost, again, atol=1e-6)
+
+
+@pytest.mark.parametrize("timing", ["fixed", "retimed"])
+def test_the_objective_is_the_stated_one_with_its_slopes(timing: str) -> None:
+    tasks, rng = some_tasks(5), np.random.default_rng(1)
+    lowered = PlanObjective(Whitening.of(tasks.poses, tasks.durations_s(SPEED)), COST, PlannerOptions(timing=timing))
+    variables, along = rng.normal(size=(2, 5, lowered.size)) * 0.1
+    value, grad = lowered(variables)
+    np.testing.assert_allclose(value, objective(tasks, *lowered.unpack(variables)), rtol=1e-12)
+    if timing == "fixed":
+        lowered.unpack(along)[1][:] = 0.0
+        assert np.all(lowered.unpack(grad)[1] == 0.0)
+    step = 1e-6
+    slope = (lowered(variables + step * along)[0] - lowered(variables - step * along)[0]) / (2.0 * step)
+    np.testing.assert_allclose((grad * along).sum(axis=1), slope, rtol=1e-5, atol=1e-7)
 
 
 @pytest.mark.parametrize("waypoints", [3, 4, 10, 60])
@@ -217,6 +245,7 @@ def test_a_plan_outside_the_training_range_falls_back_and_says_by_what() -> None
     assert len(outside) == 2
     assert all(r.startswith("outside what the cost was trained on: log duration of segment") for r in outside)
     for n, reason in enumerate(result.fallback):
+        assert (result.cost[n] == result.minimum_snap_cost[n]) == (reason is not None)
         wanted = result.minimum_snap if reason else free.plans
         np.testing.assert_allclose(result.plans.coefficients[n], wanted.coefficients[n], atol=1e-9)
 

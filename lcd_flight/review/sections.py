@@ -1,0 +1,177 @@
+"""The page's words and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import msgspec
+
+from lcd_flight.model import Outcome, Severity
+from lcd_flight.record import FlightLog
+from lcd_flight.review.figures import FlightFigures
+from lcd_flight.review.html import Html, tag
+from lcd_flight.review.scale import MINUS
+
+_VERDICTS = {Outcome.LANDED: "good", Outcome.ABORTED: "warn", Outcome.CRASHED: "bad", Outcome.CUT: "bad"}
+_SEVERITIES = {Severity.INFO: "info", Severity.WARN: "warn"}
+NOTHING = "\N{EN DASH}"
+
+
+def heading(log: FlightLog, figures: FlightFigures) -> Html:
+    """Name, verdict, and what flew when."""
+    header = log.header
+    word = "log ends in flight" if figures.outcome is None and figures.duration_s else "not flown"
+    verdict = word if figures.outcome is None else figures.outcome.value
+    style = "warn" if figures.outcome is None else _VERDICTS.get(figures.outcome, "")
+    facts = f"{header.vehicle.name} on {header.link}, {header.planner} plan, {header.started:%Y-%m-%d %H:%M:%S %Z}"
+    return tag(
+        "header",
+        tag("h1", header.name),
+        tag("span", verdict, class_=f"badge {style}"),
+        tag("p", facts),
+    )
+
+
+def warnings(log: FlightLog) -> Html:
+    """What the reader must know before believing the rest."""
+    if log.complete:
+        return Html("")
+    return tag("p", "This log was cut: the last moments before the cut may be missing.", class_="alert")
+
+
+def tiles(figures: FlightFigures) -> Html:
+    """The numbers that matter most."""
+    reached = [error for error in figures.waypoint_errors_m if error is not None]
+    flown, predicted = figures.max_position_error_m, figures.predicted_max_error_m
+    shown = [
+        ("RMS error on the trajectories", metres(figures.position_rmse_m)),
+        ("largest error on the trajectories", metres(flown)),
+        ("largest error in rehearsal", metres(predicted)),
+        (f"worst of {len(reached)}/{len(figures.waypoint_errors_m)} waypoints", metres(max(reached, default=None))),
+        ("of the flight saturated", share(figures.saturation_share)),
+        ("in the air", f"{figures.duration_s:.1f} s"),
+        ("top speed", number(figures.max_speed, "m/s")),
+        ("lateness of ticks, 99 %", f"{1e3 * figures.lateness_p99_s:.2f} ms"),
+        ("ticks missed", f"{figures.missed_ticks} of {figures.ticks}"),
+        ("lowest battery", number(figures.battery_min_V, "V")),
+    ]
+    return tag(
+        "section",
+        *(tag("div", tag("b", value), tag("span", name), class_="tile") for name, value in shown),
+        class_="tiles",
+    )
+
+
+def phase_table(figures: FlightFigures) -> Html:
+    """A row for each phase."""
+    rows = [
+        (
+            row.name,
+            f"{row.begin_s:.2f} s",
+            f"{row.duration_s:.2f} s",
+            metres(row.rmse_m),
+            metres(row.max_error_m),
+            number(row.max_speed, "m/s"),
+            share(row.saturation_share),
+        )
+        for row in figures.phases
+    ]
+    head = ("phase", "begins", "lasts", "RMS error", "largest error", "top speed", "saturated")
+    return card("Phases", table(head, rows))
+
+
+def waypoint_table(log: FlightLog, figures: FlightFigures) -> Html:
+    """A row for each waypoint."""
+    planned = [
+        (point, time_s)
+        for leg in log.header.plan.legs
+        if leg.waypoints is not None
+        for point, time_s in zip(leg.waypoints.tolist(), leg.trajectory.knot_times_s.tolist(), strict=False)
+    ]
+    rows = [
+        (str(n), *(f"{value:.2f}".replace("-", MINUS) for value in point[:3]), f"{time_s:.2f} s", metres(error))
+        for n, ((point, time_s), error) in enumerate(zip(planned, figures.waypoint_errors_m, strict=False), start=1)
+    ]
+    return card("Waypoints", table(("waypoint", "x, m", "y, m", "z, m", "planned at", "distance then"), rows))
+
+
+def finding_table(log: FlightLog) -> Html:
+    """A row for each finding."""
+    if not log.findings:
+        return card("Findings", tag("p", "None: nothing was out of the ordinary.", class_="note"), wide=True)
+    rows = [
+        tag(
+            "tr",
+            tag("td", f"{found.begin_s:.2f} s"),
+            tag("td", found.finding.severity.name.lower(), class_=_SEVERITIES.get(found.finding.severity, "severe")),
+            tag("td", f"{found.end_s - found.begin_s:.2f} s" if found.end_s > found.begin_s else "one tick"),
+            tag("td", f"{found.finding.code}: {found.finding.message}", class_="text"),
+        )
+        for found in log.findings
+    ]
+    head = tag("tr", *(tag("th", text) for text in ("at", "severity", "lasted")), tag("th", "what", class_="text"))
+    return card("Findings", tag("div", tag("table", head, *rows), class_="scroll"), wide=True)
+
+
+def configuration(log: FlightLog) -> Html:
+    """What flew, with what, and on what."""
+    header = log.header
+    vehicle = header.vehicle
+    facts = {
+        "link": header.link,
+        "seed": str(header.seed),
+        "planner": header.planner,
+        **header.notes,
+        "vehicle": f"{vehicle.name}, {1e3 * vehicle.mass_kg:.4g} g, thrust to weight {vehicle.thrust_to_weight:.2f}",
+        "log": str(log.path.name),
+    }
+    return card(
+        "Configuration",
+        definitions(facts),
+        _folded("Mission", header.mission_text),
+        _folded("Model", _json(header.model_card)),
+        _folded("Vehicle", _json(vehicle)),
+        _folded("Safety limits", _json(header.limits)),
+        _folded("Versions and machine", "\n".join(f"{key}: {value}" for key, value in header.versions.items())),
+        wide=True,
+    )
+
+
+def card(title: str, *content: Html, wide: bool = False) -> Html:
+    """A titled box."""
+    return tag("section", tag("h2", title), *content, class_="card wide" if wide else "card")
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> Html:
+    """A table that scrolls sideways on its own."""
+    lines = [tag("tr", *(tag("td", cell) for cell in row)) for row in rows]
+    return tag("div", tag("table", tag("tr", *(tag("th", text) for text in head)), *lines), class_="scroll")
+
+
+def definitions(facts: Mapping[str, str]) -> Html:
+    """Names and values."""
+    return tag("dl", *(part for key, value in facts.items() for part in (tag("dt", key), tag("dd", value))))
+
+
+def metres(value: float | None) -> str:
+    """A distance as a person says it."""
+    return NOTHING if value is None else f"{value:.3f} m"
+
+
+def number(value: float | None, unit: str) -> str:
+    """A value with its unit."""
+    return NOTHING if value is None else f"{value:.2f} {unit}"
+
+
+def share(value: float | None) -> str:
+    """A share in per cent."""
+    return NOTHING if value is None else f"{100.0 * value:.1f} %"
+
+
+def _folded(title: str, text: str) -> Html:
+    return tag("details", tag("summary", title), tag("pre", text))
+
+
+def _json(value: Any) -> str:
+    return msgspec.json.format(msgspec.json.encode(value), indent=2).decode()

@@ -9,19 +9,22 @@ import numpy as np
 from lcd_flight.model import FloatArray, IntArray, SeedArray
 from sim_bridge import rows
 from sim_bridge.lane_steps import (
-    SUBSTEPS,
     TICK_S,
     Law,
     advance,
+    command_attitude,
     command_rotors,
+    count_clips,
     disturb,
     judge,
     look,
-    reference,
+    refer,
     remember,
+    stabilise,
 )
 from sim_bridge.multirotor import Airframe
 from sim_bridge.noise import key_of
+from sim_bridge.onboard import DEGREES, Onboard
 from sim_bridge.rows import LANES, ROWS
 
 LABELS = ROWS - rows.ALIVE
@@ -49,13 +52,21 @@ class Plans(NamedTuple):
     """(N,)"""
 
 
-class Disturbance(NamedTuple):
-    """What the world does to the vehicle."""
+class Craft(NamedTuple):
+    """What flies it, all the way down to the rotors."""
 
+    air: Airframe
+    law: Law
+    onboard: Onboard
+    flight_loop: bool
+    """Whether the law's thrust and attitude go to the onboard controller; else its force and moment to the rotors."""
+    steps: int
+    """Runge-Kutta steps of a tick; in the flight loop, periods of the onboard controller."""
+    step_s: float
     motor_noise: float
     """rad/s"""
     motor_decay: float
-    """exp(-t / tau) of half a Runge-Kutta step t."""
+    """exp(-t / tau) of half a step t."""
     initial_speed: float
     """rad/s, of every rotor."""
 
@@ -73,9 +84,7 @@ class Results(NamedTuple):
     """(ticks, ROWS * LANES) the whole memory after each tick, or nothing."""
 
 
-def fly(
-    first: int, last: int, plans: Plans, air: Airframe, law: Law, disturbance: Disturbance, results: Results
-) -> None:
+def fly(first: int, last: int, plans: Plans, craft: Craft, results: Results) -> None:
     """Fly blocks `first` to `last` - 1 of LANES rows each; the last one is filled up with copies of the last row."""
     memory = np.empty(ROWS * LANES)
     lanes = np.empty(LANES, dtype=np.int64)
@@ -86,24 +95,25 @@ def fly(
             lanes[lane] = plans.order[min(block * LANES + lane, len(plans.order) - 1)]
             segments[lane] = 0
             keys[lane] = key_of(plans.seeds[lanes[lane]])
-            start_lane(memory, lane, lanes[lane], plans, disturbance)
+            start_lane(memory, lane, lanes[lane], plans, craft.initial_speed)
             results.waypoint_errors[lanes[lane], 0] = 0.0
-        fly_block(memory, lanes, segments, keys, plans, air, law, disturbance, results)
+        fly_block(memory, lanes, segments, keys, plans, craft, results)
         for lane in range(LANES):
             finish_lane(memory, lane, lanes[lane], segments[lane], results)
 
 
-def start_lane(memory: FloatArray, lane: int, row: int, plans: Plans, disturbance: Disturbance) -> None:
-    """At rest on the plan's start, the rotors carrying the weight."""
+def start_lane(memory: FloatArray, lane: int, row: int, plans: Plans, rotor_speed: float) -> None:
+    """At rest on the plan's start, with every rotor at one speed."""
     for r in range(ROWS):
         memory[r * LANES + lane] = 0.0
-    half_yaw = 0.5 * plans.yaws_rad[row]
+    yaw = plans.yaws_rad[row]
     for axis in range(3):
         memory[(rows.MOTION + axis) * LANES + lane] = plans.coefficients[row, axis, 0, 0]
-    memory[(rows.MOTION + 8) * LANES + lane] = np.sin(half_yaw)
-    memory[(rows.MOTION + 9) * LANES + lane] = np.cos(half_yaw)
+    memory[(rows.MOTION + 8) * LANES + lane] = np.sin(0.5 * yaw)
+    memory[(rows.MOTION + 9) * LANES + lane] = np.cos(0.5 * yaw)
+    memory[(rows.PID + 8) * LANES + lane] = DEGREES * np.arctan2(np.sin(yaw), np.cos(yaw))
     for rotor in range(4):
-        memory[(rows.SPEEDS + rotor) * LANES + lane] = disturbance.initial_speed
+        memory[(rows.SPEEDS + rotor) * LANES + lane] = rotor_speed
     for r in range(13):
         memory[(rows.SEEN + r) * LANES + lane] = memory[(rows.MOTION + r) * LANES + lane]
     segments = plans.durations_s.shape[1]
@@ -131,34 +141,47 @@ def fly_block(
     segments: IntArray,
     keys: SeedArray,
     plans: Plans,
-    air: Airframe,
-    law: Law,
-    disturbance: Disturbance,
+    craft: Craft,
     results: Results,
 ) -> None:
     """Tick after tick: fly under the last command, sample the reference, judge, command."""
-    next_end = pass_knots(memory, lanes, segments, 0, plans, results)
+    next_knot = pass_knots(memory, lanes, segments, 0, plans, results)
     tick = 0
     while any_runs(memory, tick):
         if tick > 0:
-            for lane in range(LANES):
-                remember(memory, lane)
-            for _ in range(SUBSTEPS):
-                for lane in range(LANES):
-                    advance(memory, lane, air, TICK_S / SUBSTEPS, disturbance.motor_decay)
-            if disturbance.motor_noise > 0.0:
-                for lane in range(LANES):
-                    disturb(memory, lane, keys[lane], np.uint64(tick), air, disturbance.motor_noise)
-        if tick >= next_end:
-            next_end = pass_knots(memory, lanes, segments, tick, plans, results)
+            fly_tick(memory, keys, tick, craft)
+        if tick >= next_knot:
+            next_knot = pass_knots(memory, lanes, segments, tick, plans, results)
         for lane in range(LANES):
             look(memory, lane, float(tick))
-            sample = reference(memory, lane, float(tick))
-            judge(memory, lane, float(tick), sample)
-            command_rotors(memory, lane, float(tick), sample, law, air)
+            refer(memory, lane, float(tick))
+        for lane in range(LANES):
+            judge(memory, lane, float(tick))
+            count_clips(memory, lane, float(tick))
+        if craft.flight_loop:
+            for lane in range(LANES):
+                command_attitude(memory, lane, craft.law, craft.onboard)
+        else:
+            for lane in range(LANES):
+                command_rotors(memory, lane, craft.law, craft.air)
         if tick < len(results.trace):
             results.trace[tick] = memory
         tick += 1
+
+
+def fly_tick(memory: FloatArray, keys: SeedArray, tick: int, craft: Craft) -> None:
+    """Ten milliseconds of flight under the setpoint or the command given last, then the motors' noise."""
+    for lane in range(LANES):
+        remember(memory, lane)
+    for _ in range(craft.steps):
+        if craft.flight_loop:
+            for lane in range(LANES):
+                stabilise(memory, lane, craft.air, craft.onboard)
+        for lane in range(LANES):
+            advance(memory, lane, craft.air, craft.step_s, craft.motor_decay)
+    if craft.motor_noise > 0.0:
+        for lane in range(LANES):
+            disturb(memory, lane, keys[lane], np.uint64(tick), craft.air, craft.motor_noise)
 
 
 def any_runs(memory: FloatArray, tick: int) -> bool:

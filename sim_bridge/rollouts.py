@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
@@ -12,13 +11,12 @@ from typing import Any
 import numpy as np
 
 import lcd_flight
-from lcd_flight.control.geometric import Allocation
 from lcd_flight.jit import Compiler
 from lcd_flight.model import FloatArray, InputError, RolloutLabels, RolloutOptions, SeedArray, Trajectories, Vehicle
 from sim_bridge import rollout_kernel, rows
-from sim_bridge.lane_steps import SUBSTEPS, TICK_S, Law
-from sim_bridge.multirotor import airframe
-from sim_bridge.rollout_kernel import LABELS, Disturbance, Plans, Results
+from sim_bridge.craft import craft_of
+from sim_bridge.lane_steps import TICK_S
+from sim_bridge.rollout_kernel import LABELS, Plans, Results
 from sim_bridge.rows import LANES
 
 _BLOCKS_AT_A_TIME = 4
@@ -44,6 +42,7 @@ class MultirotorSimulator:
 def _fly(plans: Trajectories, vehicle: Vehicle, seeds: SeedArray, options: RolloutOptions, ticks: int) -> Results:
     """Run the kernel over all rows; record the memory of the first `ticks` ticks."""
     prepared = _prepare(plans, seeds, options)
+    craft = craft_of(vehicle, options.nominal or vehicle, options.loop)
     count, segments = plans.durations_s.shape
     results = Results(
         labels=np.empty((count, LABELS)),
@@ -51,13 +50,7 @@ def _fly(plans: Trajectories, vehicle: Vehicle, seeds: SeedArray, options: Rollo
         waypoint_errors=np.full((count, segments + 1), np.nan),
         trace=np.empty((ticks, rows.ROWS * LANES)),
     )
-    disturbance = Disturbance(
-        motor_noise=vehicle.motor_noise,
-        motor_decay=math.exp(-0.5 * TICK_S / SUBSTEPS / vehicle.motor_time_constant_s),
-        initial_speed=vehicle.hover_rotor_speed,
-    )
-    arguments = (prepared, airframe(vehicle), law_of(options.nominal or vehicle), disturbance, results)
-    _over_blocks(-(-count // LANES), options.threads or os.cpu_count() or 1, arguments)
+    _over_blocks(-(-count // LANES), options.threads or os.cpu_count() or 1, (prepared, craft, results))
     return results
 
 
@@ -113,28 +106,11 @@ def _check(durations: FloatArray, coefficients: FloatArray, seeds: SeedArray, op
         raise InputError("a plan has durations that are not positive or coefficients that are not finite")
 
 
-def law_of(vehicle: Vehicle) -> Law:
-    """The paper's loop as tuned for a vehicle."""
-    x, y, _ = np.array(vehicle.rotor_positions_m).T
-    ratio = vehicle.k_m / vehicle.k_eta
-    matrix = np.array([np.ones(4), y, -x, ratio * np.array(vehicle.rotor_directions)])
-    inverse = tuple(tuple(map(float, row)) for row in np.linalg.inv(matrix))
-    gains = vehicle.gains
-    return Law(
-        mass_kg=vehicle.mass_kg,
-        inertia_kg_m2=vehicle.inertia_kg_m2,
-        position_gain=gains.position,
-        velocity_gain=gains.velocity,
-        attitude_gain=gains.attitude,
-        rate_gain=gains.body_rates,
-        allocation=Allocation(inverse, vehicle.k_eta),  # type: ignore[arg-type]
-    )
-
-
 def labels_of(results: Results) -> RolloutLabels:
     """The port's labels from the kernel's sums."""
     sums = dict(zip(_LABEL_ROWS, results.labels.T, strict=True))
     samples = np.maximum(sums[rows.SAMPLES], 1.0)
+    commands = 4.0 * np.maximum(samples - 1.0, 1.0)
     return RolloutLabels(
         max_error_m=np.sqrt(sums[rows.LARGEST]),
         max_error_time_s=sums[rows.LARGEST_TICK] * TICK_S,
@@ -146,7 +122,7 @@ def labels_of(results: Results) -> RolloutLabels:
         yaw_cost=sums[rows.YAW_COST] / samples,
         paper_cost=sums[rows.PAPER_COST],
         released_cost=sums[rows.RELEASED_COST],
-        saturation_share=sums[rows.CLIPPED] / (4.0 * samples),
+        saturation_share=sums[rows.CLIPPED] / commands,
         longest_saturation_s=sums[rows.LONGEST_RUN] * TICK_S,
         valid=sums[rows.ALIVE] > 0.0,
     )

@@ -15,40 +15,61 @@ LANES = 32
 
 MOTION = 0
 """13: position, velocity, attitude, body rates."""
-SPEEDS = 13
+SPEEDS = MOTION + 13
 """4: rotor speeds, rad/s."""
-COMMANDS = 17
+COMMANDS = SPEEDS + 4
 """4: commanded rotor speeds within the limits, rad/s."""
-SEEN = 21
-"""13: the motion as the controller is given it; it coasts while the pose is missing."""
-BEFORE = 34
+BEFORE = COMMANDS + 4
 """6: position and velocity one tick ago."""
-COEFFICIENTS = 40
+SEEN = BEFORE + 6
+"""13: the motion as the controller is given it; it coasts while the pose is missing."""
+REFERENCE = SEEN + 13
+"""11: position, velocity, acceleration, yaw in rad, yaw rate."""
+INTEGRAL = REFERENCE + 11
+"""3: acceleration in m/s^2 that the law's integral asks for."""
+SETPOINT = INTEGRAL + 3
+"""4: thrust in counts; roll, pitch, yaw in deg."""
+PID = SETPOINT + 4
+"""12: integrals of attitude and rates, attitude and rates one period ago; deg."""
+COEFFICIENTS = PID + 12
 """32: of the current segment, axis by axis, ascending."""
-SEGMENT_START = 72
+SEGMENT_START = COEFFICIENTS + 32
 """s, of the current segment."""
-DURATION = 73
+DURATION = SEGMENT_START + 1
 """s, of the plan."""
-LAST_TICK = 74
-GAP_START, GAP_END = 75, 76
-"""Ticks between which the pose is missing."""
-ALIVE = 77
-"""1 until the rollout leaves the model's validity."""
-SAMPLES = 78
+LAST_TICK = DURATION + 1
+GAP_START = LAST_TICK + 1
+"""First tick without pose."""
+GAP_END = GAP_START + 1
+"""First tick with pose again."""
+CLIPS = GAP_END + 1
+"""Motor commands clipped in this tick; 4 are all of them."""
+RUN = CLIPS + 1
+"""Unbroken ticks with a motor clipped, now."""
+
+ALIVE = RUN + 1
+"""1 until the rollout leaves the model's validity. From here on: the results."""
+SAMPLES = ALIVE + 1
 """Ticks counted so far."""
-LARGEST, LARGEST_TICK = 79, 80
-"""Largest squared error and its tick."""
-SEGMENT_LARGEST = 81
+LARGEST = SAMPLES + 1
+"""Largest squared error."""
+LARGEST_TICK = LARGEST + 1
+SUM = LARGEST_TICK + 1
+"""Of the error."""
+SUM_2 = SUM + 1
+"""Of its square."""
+SUM_8 = SUM_2 + 1
+"""Of its eighth power."""
+YAW_COST = SUM_8 + 1
+PAPER_COST = YAW_COST + 1
+RELEASED_COST = PAPER_COST + 1
+CLIPPED = RELEASED_COST + 1
+"""Motor commands clipped so far."""
+LONGEST_RUN = CLIPPED + 1
+"""Most unbroken ticks with a motor clipped."""
+SEGMENT_LARGEST = LONGEST_RUN + 1
 """Largest squared error within the current segment; -1 before its first tick."""
-SUM, SUM_2, SUM_8 = 82, 83, 84
-"""Of the error, its square and its eighth power."""
-YAW_COST, PAPER_COST, RELEASED_COST = 85, 86, 87
-"""Sums over ticks."""
-CLIPPED = 88
-"""Motor commands that were clipped."""
-RUN, LONGEST_RUN = 89, 90
-"""Unbroken ticks with a motor clipped: now, and at most."""
-ROWS = 91
+ROWS = SEGMENT_LARGEST + 1
 
 
 def load3(memory: FloatArray, row: int, lane: int) -> Vector3:

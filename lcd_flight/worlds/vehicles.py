@@ -9,12 +9,13 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from lcd_flight.model import GeometricGains, InputError, OnboardController, PidGains, Vehicle
 from lcd_flight.worlds.data_file import Strict, read
 
 _DATA = Path(__file__).parent / "data" / "vehicles"
+_ONBOARD = Path(__file__).parent / "data" / "onboard"
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
@@ -78,6 +79,17 @@ class VehicleData(Strict):
     flight_gains: GainsData | None = None
     """Left out: the same as `gains`."""
     onboard: OnboardData | None = None
+    """A mapping, or the name of one that ships (`data/onboard`)."""
+
+    @field_validator("onboard", mode="before")
+    @classmethod
+    def _by_name(cls, value: object) -> object:
+        if not isinstance(value, str):
+            return value
+        names = sorted(path.stem for path in _ONBOARD.glob("*.yaml"))
+        if value not in names:
+            raise ValueError(f"no onboard controller of this name; there are: {', '.join(names)}")
+        return read(_ONBOARD / f"{value}.yaml", OnboardData)
 
     @model_validator(mode="after")
     def _flyable(self) -> VehicleData:

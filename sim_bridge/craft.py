@@ -1,0 +1,70 @@
+"""From the vocabulary's vehicles to what the kernels fly."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from lcd_flight.control.flight_law import thrust_limit_N
+from lcd_flight.control.geometric import Allocation
+from lcd_flight.model import GeometricGains, InputError, Loop, Vehicle
+from sim_bridge.lane_steps import TICK_S, Law
+from sim_bridge.multirotor import airframe
+from sim_bridge.onboard import NO_ONBOARD, onboard
+from sim_bridge.rollout_kernel import Craft
+
+SUBSTEPS = 2
+"""Runge-Kutta steps of a tick in the paper's loop: 0.05 mm from the converged solution over 4.5 s."""
+
+
+def craft_of(vehicle: Vehicle, nominal: Vehicle, loop: Loop) -> Craft:
+    """A vehicle with the controllers of a loop, which believe that they fly `nominal`.
+
+    Raises:
+        InputError: a loop or a vehicle that the simulator cannot fly.
+    """
+    if loop not in ("paper", "flight"):
+        raise InputError(f"loop {loop!r} is not known to the simulator; it has: paper, flight")
+    flight_loop = loop == "flight"
+    try:
+        air, controller = airframe(vehicle), onboard(vehicle, nominal) if flight_loop else NO_ONBOARD
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    steps = round(TICK_S / controller.period_s) if flight_loop else SUBSTEPS
+    return Craft(
+        air=air,
+        law=_law_of(nominal, nominal.flight_gains if flight_loop else nominal.gains),
+        onboard=controller,
+        flight_loop=flight_loop,
+        steps=steps,
+        step_s=TICK_S / steps,
+        motor_noise=vehicle.motor_noise,
+        motor_decay=math.exp(-0.5 * TICK_S / steps / vehicle.motor_time_constant_s),
+        initial_speed=vehicle.hover_rotor_speed,
+    )
+
+
+def _law_of(vehicle: Vehicle, gains: GeometricGains) -> Law:
+    """The geometric law as a vehicle's controller has it."""
+    return Law(
+        mass_kg=vehicle.mass_kg,
+        inertia_kg_m2=vehicle.inertia_kg_m2,
+        position_gain=gains.position,
+        velocity_gain=gains.velocity,
+        attitude_gain=gains.attitude,
+        rate_gain=gains.body_rates,
+        allocation=_allocation(vehicle),
+        integral_gain=gains.integral,
+        integral_limit=gains.integral_limit,
+        thrust_limit_N=thrust_limit_N(vehicle),
+    )
+
+
+def _allocation(vehicle: Vehicle) -> Allocation:
+    """The inverse of the map from rotor forces to collective thrust and moments."""
+    x, y, _ = np.array(vehicle.rotor_positions_m).T
+    torque_per_thrust_m = vehicle.k_m / vehicle.k_eta
+    matrix = np.array([np.ones(4), y, -x, torque_per_thrust_m * np.array(vehicle.rotor_directions)])
+    a, b, c, d = ((float(i), float(j), float(k), float(m)) for i, j, k, m in np.linalg.inv(matrix))
+    return Allocation((a, b, c, d), vehicle.k_eta)

@@ -14,8 +14,12 @@ import numpy as np
 from rotorpy.trajectories.minsnap import MinSnap
 from threadpoolctl import threadpool_limits
 
-from lcd_flight.model import FloatArray, Trajectory
+from lcd_flight.model import FloatArray, Tasks, Trajectory
+from lcd_flight.planning.cost.features import FEATURE_NAMES, segment_features, segment_features_pullback
+from lcd_flight.planning.cost.model_file import load_model, model_names
+from lcd_flight.planning.cost.tracking_cost import CostModel
 from lcd_flight.planning.minimum_snap import minimum_snap, minimum_snap_batch
+from lcd_flight.planning.planner import plan_batch
 from lcd_flight.planning.times import allocate
 
 SPEED = 2.0
@@ -25,6 +29,9 @@ BATCH = 20_000
 SAME = 1e-3
 """Both sides must plan the same path, m; RotorPy's interior-point solver is this exact."""
 
+LEARNED = ((1, 3), (500, 3), (1, 50))
+"""Tasks at once, and segments of each."""
+
 Report = Callable[[str], None]
 Row = dict[str, Any]
 
@@ -32,7 +39,7 @@ Row = dict[str, Any]
 def rows(report: Report) -> list[Row]:
     """All rows of `lcd bench plan`."""
     with threadpool_limits(1):
-        return minimum_snap_rows(report)
+        return [*minimum_snap_rows(report), *learned_rows(report)]
 
 
 def minimum_snap_rows(report: Report) -> list[Row]:
@@ -44,6 +51,47 @@ def minimum_snap_rows(report: Report) -> list[Row]:
     measured.append(_one_task(200, "minsnap-trajectories", _trajectories, report))
     measured.append(_batched(report))
     return measured
+
+
+def learned_rows(report: Report) -> list[Row]:
+    """What the learned tracking cost takes; the planner's rows need a model that ships."""
+    durations, coefficients = _segments(BATCH)
+    report("features of a segment")
+    forward = _least_s(lambda: segment_features(durations, coefficients)) / BATCH
+    grad = np.ones((BATCH, 1, len(FEATURE_NAMES)))
+    backward = _least_s(lambda: segment_features_pullback(durations, coefficients, grad)) / BATCH
+    measured = [
+        _row_alone("features of a segment", "us", 1e6 * forward),
+        _row_alone("pullback of the features of a segment", "us", 1e6 * backward),
+    ]
+    for name in model_names()[:1]:
+        model = load_model(name)
+        measured += [_learned(model, tasks, segments, report) for tasks, segments in LEARNED]
+    return measured
+
+
+def _segments(count: int) -> tuple[FloatArray, FloatArray]:
+    """`count` segments of minimum snap, each a plan of its own: (N, 1) and (N, 4, 1, 8)."""
+    waypoints = _waypoints(-(-count // 3), 3)
+    plans = minimum_snap_batch(waypoints, allocate(waypoints, SPEED))
+    coefficients = plans.coefficients.transpose(0, 2, 1, 3).reshape(-1, 4, 1, 8)
+    return plans.durations_s.reshape(-1, 1)[:count], coefficients[:count]
+
+
+def _learned(model: CostModel, tasks: int, segments: int, report: Report) -> Row:
+    """A whole plan: 40 steps, and the judgement of what they led to."""
+    what = f"learned plan, {segments} segments, " + ("one task" if tasks == 1 else f"{tasks} tasks at once")
+    report(what)
+    poses = _waypoints(tasks, segments)
+    some = Tasks(poses[..., :3], poses[..., 3])
+    durations = some.durations_s(SPEED)
+    took = _least_s(lambda: plan_batch(some, durations, model)) / tasks
+    return _row_alone(what, "ms" if tasks == 1 else "ms a task", 1e3 * took)
+
+
+def _row_alone(what: str, unit: str, ours: float) -> Row:
+    """Of something that no peer has."""
+    return {"what": what, "unit": unit, "ours": ours, "peer": None, "peer_name": None, "ratio": None}
 
 
 def _one_task(segments: int, peer_name: str, peer: Callable[[FloatArray], Trajectory], report: Report) -> Row:

@@ -27,7 +27,7 @@ from lcd_flight.mission.plan_mission import PlannedMission, load_cost, plan_miss
 from lcd_flight.model import RefusedError, Vehicle
 from lcd_flight.observers.log_thread import LogStatistics, LogThread
 from lcd_flight.record import FlightHeader, LogWriter, log_path, read_log
-from lcd_flight.rehearsal import rehearse as rehearsals
+from lcd_flight.rehearsal.rehearse import rehearse as fly_in_simulation
 from lcd_flight.rehearsal.verdict import Rehearsal
 from lcd_flight.review.figures import FlightFigures, figures_of
 from lcd_flight.review.page import write_page
@@ -76,7 +76,7 @@ def rehearse(
 
     runs: in place of the mission's `rehearse.runs`.
     """
-    return rehearsals.rehearse(
+    return fly_in_simulation(
         flight.planned.plan, flight.mission, flight.vehicle, plugins.simulator(), runs=runs, progress=progress
     )
 

@@ -121,7 +121,7 @@ async def _opened(
 ) -> tuple[PoseSource, Link]:
     """Pose source and link, open until the stack closes; a simulated vehicle publishes its pose on the way."""
     uri, capture = options.uri or mission.vehicle.uri, mission.motion_capture
-    simulated = parse_uri(uri).link == SIMULATOR
+    simulated = is_simulated(uri)
     _require_consent(simulated, uri, options)
     endpoint = LOOPBACK if options.fast else capture.endpoint
     publisher = pose_publisher(endpoint) if simulated else None
@@ -140,6 +140,15 @@ async def _opened(
         rigid_body=capture.rigid_body,
     )
     return pose, await stack.enter_async_context(open_link(uri, context))
+
+
+def is_simulated(uri: str) -> bool:
+    """Whether a link leads to the simulator.
+
+    Raises:
+        InputError: not a URI, or an unknown link.
+    """
+    return parse_uri(uri).link == SIMULATOR
 
 
 def _require_consent(simulated: bool, uri: str, options: FlightOptions) -> None:

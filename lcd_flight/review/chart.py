@@ -21,6 +21,9 @@ WIDTH, HEIGHT = 2000, 1000
 MOST_POINTS = 700
 """Of one trace."""
 
+_HANGS_OVER = 0.95
+"""Share of the width from which on a number has no room to its right."""
+
 _LEAST_NAMED = 0.04
 """Share of the width below which a phase has no room for its name."""
 
@@ -205,12 +208,13 @@ def _times(timeline: Timeline) -> Html:
 
 
 def axis_marks(axis: Axis, unit: str) -> Html:
-    """The numbers of a horizontal axis; the last one carries the unit."""
+    """The numbers of a horizontal axis; the last one carries the unit, and ends at the axis where it would hang over."""
     ticks = axis.ticks(6)
     texts = [*map(label, ticks[:-1]), f"{label(ticks[-1])} {unit}"]
+    shares = [_share(axis, value) for value in ticks]
     marks = [
-        tag("span", text, style=f"left:{100.0 * _share(axis, value):.2f}%")
-        for text, value in zip(texts, ticks, strict=True)
+        tag("span", text, class_="end" if share > _HANGS_OVER else None, style=f"left:{100.0 * share:.2f}%")
+        for text, share in zip(texts, shares, strict=True)
     ]
     return tag("div", *marks, class_="times")
 

@@ -1,0 +1,224 @@
+"""The report: whole, self-contained, and harmless whatever a log says."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from html import unescape
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+import synthetic_flight
+from synthetic_flight import log_of
+
+from lcd_flight.model import Finding, PoseReport, Severity
+from lcd_flight.record import FlightLog
+from lcd_flight.review import write_page, write_path_figure
+from lcd_flight.review.page import page
+from lcd_flight.review.plots import euler_deg, panels, timeline
+from lcd_flight.review.view import HEIGHT, WIDTH, View, path_drawing
+
+EVIL = "<script>alert('x')</script>"
+
+
+class Outline(HTMLParser):
+    """Which tags there are, and whether each is closed."""
+
+    EMPTY = frozenset({"meta", "input"})
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.seen: list[tuple[str, dict[str, str | None]]] = []
+        self.text: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.seen.append((tag, dict(attrs)))
+        if tag not in self.EMPTY:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.seen.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text.append(data)
+
+    def count(self, tag: str, style: str = "") -> int:
+        return sum(name == tag and style in ["", *(attrs.get("class") or "").split()] for name, attrs in self.seen)
+
+
+def outline(html: str) -> Outline:
+    parser = Outline()
+    parser.feed(html)
+    assert parser.open == []
+    return parser
+
+
+@pytest.fixture(scope="module")
+def log() -> FlightLog:
+    gap = Finding("pose_gap", Severity.WARN, "pose gap 42 ms (limit 300 ms)")
+    return log_of(synthetic_flight.with_finding(synthetic_flight.flight(), 500, 504, gap))
+
+
+def test_all_that_belongs_on_the_page_is_there(log: FlightLog) -> None:
+    html = page(log)
+    found = outline(html)
+    words = " ".join(found.text)
+    for title in ("Position error", "Position", "Velocity", "Attitude", "Body rates", "Thrust and saturation"):
+        assert title in found.text
+    for title in ("Battery", "Motion capture", "Loop timing", "Phases", "Waypoints", "Findings", "Configuration"):
+        assert title in found.text
+    assert "four-waypoint test" in found.text
+    assert "landed" in found.text
+    assert "1.5 m: land at once" in found.text
+    assert "pose_gap: pose gap 42 ms (limit 300 ms)" in found.text
+    assert "0.250 m" in found.text  # the rehearsal's
+    assert "0123abcd" in words  # the model's hash
+    assert found.count("g", "trace") >= 20
+    assert found.count("polyline", "baseline") == 1
+    assert found.count("g", "waypoint") == 4
+
+
+def test_it_is_one_small_file_that_loads_nothing(log: FlightLog, tmp_path: Path) -> None:
+    path = write_page(log, tmp_path / "report.html")
+    html = unescape(path.read_text(encoding="utf-8"))
+    assert path.stat().st_size < 450_000
+    assert not [attrs for _, attrs in outline(path.read_text(encoding="utf-8")).seen if {"src", "href"} & set(attrs)]
+    assert "url(" not in html
+    assert "@import" not in html
+    assert "default-src 'none'" in html
+
+
+def test_a_long_flight_is_no_larger(log: FlightLog) -> None:
+    pairs = synthetic_flight.flight()
+    many = []
+    for lap in range(12):
+        shift_ns = lap * 971 * synthetic_flight.TICK_NS
+        many += [(i, replace(t, now_ns=t.now_ns + shift_ns)) for i, t in pairs]
+    assert len(page(log_of(many))) < 2.0 * len(page(log))
+
+
+def test_nothing_in_a_log_becomes_markup() -> None:
+    finding = Finding(EVIL, Severity.KILL, EVIL)
+    pairs = synthetic_flight.with_finding(synthetic_flight.flight(), 300, 310, finding)
+    vehicle = replace(synthetic_flight.header().vehicle, name=EVIL)
+    html = page(
+        log_of(
+            pairs,
+            name=EVIL,
+            mission_text=EVIL,
+            link=EVIL,
+            planner=EVIL,
+            vehicle=vehicle,
+            model_card={EVIL: EVIL},
+            notes={EVIL: EVIL},
+            versions={EVIL: EVIL},
+        )
+    )
+    assert EVIL not in html
+    assert outline(html).count("script") == 1  # ours
+
+
+def test_a_cut_log_says_so(log: FlightLog) -> None:
+    cut = replace(log, complete=False)
+    assert "This log was cut" in page(cut)
+    assert "This log was cut" not in page(log)
+
+
+@pytest.mark.parametrize("ticks", [1, 2, 15, 25])
+def test_the_shortest_logs_have_a_page(ticks: int) -> None:
+    html = page(log_of(synthetic_flight.flight()[:ticks]))
+    assert "not flown" in html or "log ends in flight" in html
+    outline(html)
+
+
+def test_a_flight_without_pose_telemetry_and_model_has_a_page() -> None:
+    blind = []
+    for inputs, tick in synthetic_flight.flight():
+        link = replace(inputs.link, telemetry=None)
+        without = replace(inputs, pose=PoseReport(None, None), link=link)
+        blind.append((without, replace(tick, position_error_W=None)))
+    html = page(log_of(blind, model_card={}, predicted_max_error_m=None))
+    assert "Battery" not in outline(html).text
+    assert not re.search(r"\bnan\b", html, re.IGNORECASE)
+
+
+def test_a_wait_on_the_ground_is_not_shown() -> None:
+    pairs = synthetic_flight.flight()
+    waiting_ns = 60_000_000_000
+    flown = [(i, replace(t, now_ns=t.now_ns + (waiting_ns if t.sequence > 5 else 0))) for i, t in pairs]
+    log = log_of(flown)
+    assert timeline(log).axis.low == pytest.approx(60.2 - 2.0)
+
+
+def test_every_chart_shares_the_flights_time(log: FlightLog) -> None:
+    for panel in panels(log):
+        for chart in panel.charts:
+            for trace in chart.traces:
+                assert len(trace.values) == len(log.series)
+
+
+def test_attitude_in_degrees() -> None:
+    sin, cos = 0.5, np.sqrt(0.75)  # 60 degrees about each axis
+    q = np.array([[sin, 0.0, 0.0, cos], [0.0, sin, 0.0, cos], [0.0, 0.0, sin, cos]])
+    np.testing.assert_allclose(euler_deg(q), 60.0 * np.eye(3), atol=1e-9)
+
+
+def test_yaw_goes_on_beyond_half_a_turn() -> None:
+    yaw = np.radians(np.arange(0.0, 720.0, 10.0))
+    q = np.stack([0.0 * yaw, 0.0 * yaw, np.sin(yaw / 2), np.cos(yaw / 2)], axis=1)
+    assert euler_deg(q)[:, 2].tolist() == pytest.approx(np.arange(0.0, 720.0, 10.0).tolist(), abs=1e-6)
+
+
+# The path
+
+
+def test_up_is_up_and_the_middle_is_the_middle() -> None:
+    view = View((1.0, 2.0, 3.0), 100.0)
+    ((x, y), (x_above, y_above)) = view.project(np.array([[1.0, 2.0, 3.0], [1.0, 2.0, 4.0]])).tolist()
+    assert (x, y) == (WIDTH / 2, HEIGHT / 2)
+    assert x_above == x
+    assert y_above < y
+
+
+def test_lengths_are_true_where_they_lie_across() -> None:
+    """The drawing is orthographic: it turns, scales and drops one direction, so no length grows."""
+    view = View((0.0, 0.0, 0.0), 50.0)
+    axes = view.project(np.eye(3)) - (WIDTH / 2, HEIGHT / 2)
+    assert np.sum(axes**2) == pytest.approx(2.0 * 50.0**2)
+
+
+def test_the_whole_path_is_in_the_drawing(log: FlightLog) -> None:
+    drawing = ET.fromstring(path_drawing(log))  # noqa: S314 - made here
+    for name in ("flown", "reference", "baseline"):
+        (line,) = (element for element in drawing if element.get("class") == name)
+        places = np.array([point.split(",") for point in line.get("points", "").split()], dtype=float)
+        assert len(places) > 50
+        assert (places.min(axis=0) > 0.0).all()
+        assert (places.max(axis=0) < (WIDTH, HEIGHT)).all()
+
+
+def test_shapes_carry_their_points_for_the_script(log: FlightLog) -> None:
+    drawing = ET.fromstring(path_drawing(log))  # noqa: S314 - made here
+    (waypoint, *_others) = (element for element in drawing if element.get("class") == "waypoint")
+    assert waypoint.get("data-xyz") == "0,0,1000"
+    for element in drawing:
+        points = element.get("points")
+        if points is not None:
+            assert len(points.split()) == len(element.get("data-xyz", "").split())
+
+
+def test_the_still_is_a_picture_of_its_own(log: FlightLog, tmp_path: Path) -> None:
+    path = write_path_figure(log, tmp_path / "path.svg")
+    text = path.read_text(encoding="utf-8")
+    picture = ET.fromstring(text)  # noqa: S314 - made here
+    assert picture.tag == "{http://www.w3.org/2000/svg}svg"
+    assert "prefers-color-scheme: dark" in text
+    assert "largest error 0.10 m" in text
+    assert path.stat().st_size < 150_000

@@ -208,7 +208,7 @@ def _times(timeline: Timeline) -> Html:
 
 
 def axis_marks(axis: Axis, unit: str) -> Html:
-    """The numbers of a horizontal axis; the last one carries the unit, and ends at the axis where it would hang over."""
+    """The numbers of a horizontal axis; the last one carries the unit, and ends with the axis where it hangs over."""
     ticks = axis.ticks(6)
     texts = [*map(label, ticks[:-1]), f"{label(ticks[-1])} {unit}"]
     shares = [_share(axis, value) for value in ticks]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lcd_flight.review.scale import Axis, axis_around, label, runs, visible
@@ -42,6 +42,7 @@ def test_an_axis_holds_what_is_known_and_has_a_least_span() -> None:
     assert nothing.low < 0.0 < nothing.high
 
 
+@settings(deadline=None)
 @given(st.floats(-1e6, 1e6), st.floats(1e-6, 1e6), st.integers(2, 8))
 def test_ticks_are_within_and_not_too_many(low: float, span: float, count: int) -> None:
     axis = Axis(low, low + span)
@@ -63,6 +64,7 @@ def test_runs_are_the_stretches_without_gaps() -> None:
     assert runs(np.array([])) == []
 
 
+@settings(deadline=None)
 @given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=3000), st.integers(4, 200))
 def test_thinning_keeps_the_ends_and_the_peaks(values: list[float], most: int) -> None:
     column = np.array(values)

@@ -155,9 +155,9 @@ def polynomials_pullback(
                 slope = -(4 + k) * HERMITE_STEP[k] * step * powers[4 + k]
                 for a in range(6):
                     exponent = 3 + k - a % 3
-                    factor_a = HERMITE[k, a] * powers[exponent]
-                    grad_knots[3 * i + a, axis] += grad[4 + k] * factor_a
-                    slope -= exponent * factor_a * knots[3 * i + a, axis]
+                    entry = HERMITE[k, a] * powers[exponent]
+                    grad_knots[3 * i + a, axis] += grad[4 + k] * entry
+                    slope -= exponent * entry * knots[3 * i + a, axis]
                 grad_durations[i] += grad[4 + k] * slope * powers[1]
 
 

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import lcd_flight
-from lcd_flight.jit import Compiler
 from lcd_flight.model import FloatArray, InputError, RolloutLabels, RolloutOptions, SeedArray, Trajectories, Vehicle
-from sim_bridge import rollout_kernel, rows
+from sim_bridge.compiled import rollout_kernel
 from sim_bridge.craft import craft_of
-from sim_bridge.lane_steps import TICK_S
-from sim_bridge.rollout_kernel import LABELS, Plans, Results
-from sim_bridge.rows import LANES
+from sim_bridge.kernels import rows
+from sim_bridge.kernels.lane import TICK_S
+from sim_bridge.kernels.rollout import LABELS, Plans, Results
+from sim_bridge.kernels.rows import LANES
 
 _BLOCKS_AT_A_TIME = 4
 """Handed to a thread in one call: small enough to share evenly and to be interrupted soon."""
@@ -56,7 +53,7 @@ def _fly(plans: Trajectories, vehicle: Vehicle, seeds: SeedArray, options: Rollo
 
 def _over_blocks(blocks: int, threads: int, arguments: tuple[Any, ...]) -> None:
     """Share the blocks among threads; the kernel holds no lock."""
-    kernel = _kernel()
+    kernel = rollout_kernel()
     starts = range(0, blocks, _BLOCKS_AT_A_TIME)
     if threads == 1 or len(starts) <= 1:
         for start in starts:
@@ -129,18 +126,3 @@ def labels_of(results: Results) -> RolloutLabels:
 
 
 _LABEL_ROWS = range(rows.ALIVE, rows.ROWS)
-
-
-@cache
-def _kernel() -> Any:
-    """The compiled kernel; its machine code is kept on disk until any source that goes into it changes."""
-    house = Path(lcd_flight.__file__).parent
-    sources = Compiler(
-        Path(__file__).parent,
-        house / "control",
-        house / "model",
-        error_model="numpy",
-        nogil=True,
-        fastmath={"contract", "nsz", "arcp"},
-    )
-    return sources.kernel(rollout_kernel.fly)

@@ -1,7 +1,7 @@
-"""The multirotor's equations of motion: RotorPy's model (Folk, Paulos, Kumar 2023, section II) for four rotors in a plane.
+"""The multirotor's equations of motion: RotorPy's model (Folk, Paulos, Kumar 2023, section II), four rotors in a plane.
 
-Scalars and tuples, `math` only: compiled into the kernels by their callers. The wrench of all rotors is written with
-their summed moments (sum of O_i, O_i x_i, O_i x_i y_i ...), which is the sum over rotors rearranged: with u_i = v_a + w x r_i,
+Scalars and tuples, `math` only. The wrench of all rotors is written with their summed moments (sum of O_i, O_i x_i,
+O_i x_i y_i ...), which is the sum over rotors rearranged: with u_i = v_a + w x r_i and v_a the airspeed,
 
     T_i = k_eta O_i^2 + k_h (u_ix^2 + u_iy^2),  H_i = -O_i diag(k_d, k_d, k_z) u_i,  D = -|v_a| diag(c_D) v_a
     F = sum(T_i e3 + H_i) + D,  M = sum(r_i x (T_i e3 + H_i) + dir_i k_m O_i^2 e3 - k_flap O_i (u_i x e3))
@@ -239,7 +239,9 @@ def turned(q: Quaternion, rate: Quaternion, h: float) -> Quaternion:
     return (q[0] + h * rate[0], q[1] + h * rate[1], q[2] + h * rate[2], q[3] + h * rate[3])
 
 
-def step(motion: Motion, at_start: RotorSums, at_middle: RotorSums, at_end: RotorSums, air: Airframe, h: float) -> Motion:
+def step(
+    motion: Motion, at_start: RotorSums, at_middle: RotorSums, at_end: RotorSums, air: Airframe, h: float
+) -> Motion:
     """One Runge-Kutta step of order 4 over h seconds, with the rotors' sums at its start, middle and end.
 
     The attitude is not normalised. Positions follow from the stages' velocities: dp/dt = v.

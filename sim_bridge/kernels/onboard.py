@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from lcd_flight.control.geometric import Rotation, Row4, clipped
 from lcd_flight.model import PidGains, Vector3, Vehicle
-from sim_bridge.elementary import arctan2
+from sim_bridge.kernels.elementary import arctan2
 
 FULL_SCALE = 65535.0
 """Thrust counts at which a motor gives its largest force."""
@@ -190,14 +190,14 @@ def cascade(
 
 
 def mixed(thrust: float, outputs: Vector3, controller: Onboard) -> tuple[Row4, Row4]:
-    """Motor commands in counts: as asked for, and as given (one motor above full scale lowers all; none below the floor)."""
+    """Motor commands in counts, as asked for and as given: one above full scale lowers all, none is below the floor."""
     roll, pitch, yaw = 0.5 * outputs[0], 0.5 * outputs[1], outputs[2]
     x, y, z = controller.roll_signs, controller.pitch_signs, controller.yaw_signs
     a = thrust + x[0] * roll + y[0] * pitch + z[0] * yaw
     b = thrust + x[1] * roll + y[1] * pitch + z[1] * yaw
     c = thrust + x[2] * roll + y[2] * pitch + z[2] * yaw
     d = thrust + x[3] * roll + y[3] * pitch + z[3] * yaw
-    excess = clipped(max(max(a, b), max(c, d)) - FULL_SCALE, 0.0, math.inf)
+    excess = clipped(max(a, b, c, d) - FULL_SCALE, 0.0, math.inf)
     low = controller.floor if thrust > 0.0 else 0.0
     given = (
         clipped(a - excess, low, FULL_SCALE),

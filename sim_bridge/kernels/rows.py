@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from lcd_flight.control.geometric import Row4
 from lcd_flight.model import FloatArray, Vector3
-from sim_bridge.multirotor import Motion
+from sim_bridge.kernels.multirotor import Motion
 
 LANES = 32
 """Vehicles side by side; a multiple of the widest vector, so that no lane is computed by other instructions."""

@@ -1,7 +1,8 @@
 """Normal random numbers by counter: the same key and counter give the same numbers, wherever and whenever.
 
-splitmix64 (Steele, Lea, Flood 2014): output c of the stream of a key is `mix(key + (c + 1) * GAMMA)`; a key is the mixed seed, so
-that streams of neighbouring seeds have nothing in common. Box-Muller makes two normal numbers from one output.
+splitmix64 (Steele, Lea, Flood 2014): output c of the stream of a key is `mix(key + (c + 1) * GAMMA)`; a key is the
+mixed seed, so that streams of neighbouring seeds have nothing in common. Box and Muller make two normal numbers of one
+output.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import math
 
 import numpy as np
 
-from sim_bridge.elementary import cos_sin, logarithm
+from sim_bridge.kernels.elementary import cos_sin, logarithm
 
 _GAMMA = np.uint64(0x9E3779B97F4A7C15)
 _FACTOR_1 = np.uint64(0xBF58476D1CE4E5B9)

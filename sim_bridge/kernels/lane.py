@@ -24,11 +24,11 @@ from lcd_flight.control.geometric import (
     scaled,
 )
 from lcd_flight.model import FloatArray, Vector3
-from sim_bridge import rows
-from sim_bridge.elementary import arctan2, cos_sin
-from sim_bridge.multirotor import Airframe, Motion, lagged, normalized, rotor_sums, step
-from sim_bridge.noise import normal_pair
-from sim_bridge.onboard import (
+from sim_bridge.kernels import rows
+from sim_bridge.kernels.elementary import arctan2, cos_sin
+from sim_bridge.kernels.multirotor import Airframe, Motion, lagged, normalized, rotor_sums, step
+from sim_bridge.kernels.noise import normal_pair
+from sim_bridge.kernels.onboard import (
     DEGREES,
     Onboard,
     PidMemory,
@@ -39,7 +39,7 @@ from sim_bridge.onboard import (
     roll_pitch_yaw,
     speed_of,
 )
-from sim_bridge.rows import LANES, load3, load4, load_motion, store3, store4, store_motion
+from sim_bridge.kernels.rows import LANES, load3, load4, load_motion, store3, store4, store_motion
 
 TICK_S = 0.01
 """The control step."""
@@ -111,7 +111,7 @@ def look(memory: FloatArray, lane: int, tick: float) -> None:
     """Give the controller the motion; within a gap of the pose its last velocity and attitude go on."""
     motion = load_motion(memory, rows.MOTION, lane)
     seen = load_motion(memory, rows.SEEN, lane)
-    p, v, q, w = seen
+    p, v, q, _ = seen
     gap = (tick >= memory[rows.GAP_START * LANES + lane]) & (tick < memory[rows.GAP_END * LANES + lane])
     coasted = (p[0] + TICK_S * v[0], p[1] + TICK_S * v[1], p[2] + TICK_S * v[2])
     store3(memory, rows.SEEN, lane, chosen3(gap, coasted, motion.p_WB))
@@ -174,8 +174,8 @@ def judge(memory: FloatArray, lane: int, tick: float) -> None:
     """Add this tick's errors to the labels, unless the rollout is over or has left the model's validity."""
     p, v, q, w = load_motion(memory, rows.MOTION, lane)
     ref = reference(memory, lane)
-    fastest = max(max(abs(v[0]), abs(v[1])), abs(v[2]))
-    quickest = max(max(abs(w[0]), abs(w[1])), abs(w[2]))
+    fastest = max(abs(v[0]), abs(v[1]), abs(v[2]))
+    quickest = max(abs(w[0]), abs(w[1]), abs(w[2]))
     alive = (memory[rows.ALIVE * LANES + lane] > 0.0) & (fastest <= MAX_SPEED) & (quickest <= MAX_RATE)
     running = tick <= memory[rows.LAST_TICK * LANES + lane]
     memory[rows.ALIVE * LANES + lane] = 1.0 if alive else (0.0 if running else memory[rows.ALIVE * LANES + lane])

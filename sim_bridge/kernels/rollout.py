@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from lcd_flight.model import FloatArray, IntArray, SeedArray
-from sim_bridge import rows
-from sim_bridge.lane_steps import (
+from sim_bridge.kernels import rows
+from sim_bridge.kernels.lane import (
     TICK_S,
     Law,
     advance,
@@ -22,10 +22,10 @@ from sim_bridge.lane_steps import (
     remember,
     stabilise,
 )
-from sim_bridge.multirotor import Airframe
-from sim_bridge.noise import key_of
-from sim_bridge.onboard import DEGREES, Onboard
-from sim_bridge.rows import LANES, ROWS
+from sim_bridge.kernels.multirotor import Airframe
+from sim_bridge.kernels.noise import key_of
+from sim_bridge.kernels.onboard import DEGREES, Onboard
+from sim_bridge.kernels.rows import LANES, ROWS
 
 LABELS = ROWS - rows.ALIVE
 """How many rows of a lane's memory are its result, from ALIVE on."""
@@ -197,7 +197,7 @@ def pass_knots(
 ) -> int:
     """Take the lanes that reached a knot into their next segment; return the tick of the next knot of any lane."""
     count = plans.durations_s.shape[1]
-    next_end = np.int64(1 << 62)
+    next_end = 1 << 62
     for lane in range(LANES):
         row = lanes[lane]
         alive = memory[rows.ALIVE * LANES + lane] > 0.0
@@ -209,9 +209,7 @@ def pass_knots(
     return next_end
 
 
-def pass_knot(
-    memory: FloatArray, lane: int, row: int, segment: int, tick: int, plans: Plans, results: Results
-) -> None:
+def pass_knot(memory: FloatArray, lane: int, row: int, segment: int, tick: int, plans: Plans, results: Results) -> None:
     """Note the error at the segment's end, between the last tick and this one; load the next segment."""
     share = plans.knots_s[row, segment + 1] / TICK_S - (tick - 1)
     total = 0.0
@@ -235,7 +233,9 @@ def between(memory: FloatArray, lane: int, axis: int, share: float) -> float:
     p1 = memory[(rows.MOTION + axis) * LANES + lane]
     v1 = memory[(rows.MOTION + 3 + axis) * LANES + lane] * TICK_S
     rest = 1.0 - share
-    return rest * rest * (p0 * (1.0 + 2.0 * share) + v0 * share) + share * share * (p1 * (3.0 - 2.0 * share) - v1 * rest)
+    begun = p0 * (1.0 + 2.0 * share) + v0 * share
+    ended = p1 * (1.0 + 2.0 * rest) - v1 * rest
+    return float(rest * rest * begun + share * share * ended)
 
 
 def finish_lane(memory: FloatArray, lane: int, row: int, segment: int, results: Results) -> None:

@@ -29,8 +29,8 @@ class Camera:
         self._twist = twist
         self._frames = 0
 
-    def frame(self, state: State, now_ns: int) -> bytes:
-        """The next frame: the vehicle as it is now."""
+    def frame(self, state: State, state_ns: int, now_ns: int) -> bytes:
+        """The next frame, sent at `now_ns`: the vehicle as it was at `state_ns`."""
         n = self._frames
         self._frames += 1
         draws: list[float] = self._noise.normals(np.array([n]), 12)[0].tolist()
@@ -38,7 +38,7 @@ class Camera:
             body=self._rigid_body,
             sequence=n,
             frame_number=n,
-            source_time_ns=now_ns,
+            source_time_ns=state_ns,
             send_time_ns=now_ns,
             clock_id=CLOCK_ID,
             position=_shaken(state.p_WB, draws[0:3], self._position_sigma_m),

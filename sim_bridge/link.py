@@ -20,12 +20,13 @@ import msgspec
 from lcd_flight.model import AttitudeThrust, InputError, LinkContext, LinkReport, RefusedError, Telemetry
 from lcd_flight.wire.uri_options import read_options
 from sim_bridge.camera import Camera
-from sim_bridge.vehicle import SimulatedVehicle
+from sim_bridge.vehicle import SimulatedVehicle, warm_up
 
 PERIOD_NS = 10_000_000
 """Of pose and telemetry: 100 Hz."""
-PHASE_NS = 5_000_000
-"""A camera system does not know of the flight's ticks: half a period is what it is late on average."""
+PHASE_NS = 6_000_000
+"""From connecting to the first pose: a camera system does not know of the flight's ticks. Half a period would be the
+average; this is the next whole period of the onboard controller, so that poses are published when they are true."""
 MAX_AGE_NS = 50_000_000
 """A setpoint older than this is refused."""
 
@@ -72,6 +73,7 @@ class SimulatedLink:
 
     def __init__(self, options: SimOptions, context: LinkContext) -> None:
         self._options = options
+        self._context = context
         self._clock = context.clock
         self._publish = context.publish_pose
         self._camera = Camera(
@@ -88,6 +90,7 @@ class SimulatedLink:
 
     async def __aenter__(self) -> Self:
         """Switch the vehicle on."""
+        warm_up(self._context)
         now_ns = self._clock.now_ns()
         self._vehicle.switch_on(now_ns)
         self._open = True
@@ -126,11 +129,12 @@ class SimulatedLink:
             self._vehicle.disarm(self._clock.now_ns())
 
     def send(self, setpoint: AttitudeThrust, stamp_ns: int) -> None:
-        """Hand over the setpoint of the tick that began at `stamp_ns`; the newest wins, an old one is refused."""
+        """Hand over the setpoint of the tick that began at `stamp_ns`; the newest wins, an unfit one is refused."""
         if not self._open:
             return
         now_ns = self._clock.now_ns()
-        if now_ns - stamp_ns > MAX_AGE_NS or stamp_ns < self._newest_stamp_ns:
+        fresh = now_ns - stamp_ns <= MAX_AGE_NS and stamp_ns >= self._newest_stamp_ns
+        if not (fresh and setpoint.is_finite()):
             self._stale += 1
             return
         self._newest_stamp_ns = stamp_ns
@@ -163,7 +167,7 @@ class SimulatedLink:
             await self._clock.sleep_until(due_ns)
             now_ns = self._clock.now_ns()
             self._vehicle.advance_to(now_ns)
-            frame = self._camera.frame(self._vehicle.state, now_ns)
+            frame = self._camera.frame(self._vehicle.state, self._vehicle.state_ns, now_ns)
             if self._publish is not None and not self._in_pose_gap(now_ns):
                 self._publish(frame)
             if self._vehicle.alive:

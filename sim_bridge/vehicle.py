@@ -18,14 +18,21 @@ FALLBACK_SHARE = 0.95
 """Of the weight: it comes down slowly."""
 
 
+def warm_up(context: LinkContext) -> None:
+    """Compile what flying needs: seconds the first time, which must not fall into the flight."""
+    Plant(context.vehicle, _standing(context), context.seed).advance(FALLBACK_NS)
+
+
+def _standing(context: LinkContext) -> State:
+    rest = (0.0, 0.0, 0.0)
+    return State(p_WB=context.initial_position_m, v_WB_W=rest, q_WB=from_yaw(context.initial_yaw_rad), w_WB_B=rest)
+
+
 class SimulatedVehicle:
     """One vehicle, standing where the mission says."""
 
     def __init__(self, context: LinkContext, battery_V: float | None) -> None:
-        x, y, z = context.initial_position_m
-        rest = (0.0, 0.0, 0.0)
-        standing = State(p_WB=(x, y, z), v_WB_W=rest, q_WB=from_yaw(context.initial_yaw_rad), w_WB_B=rest)
-        self._plant = Plant(context.vehicle, standing, context.seed, battery_V=battery_V)
+        self._plant = Plant(context.vehicle, _standing(context), context.seed, battery_V=battery_V)
         self._hover_N = context.vehicle.weight_N
         self._time_ns = 0
         self._locked = ""
@@ -37,6 +44,11 @@ class SimulatedVehicle:
         self.alive = True
         """Whether it has power; without, nothing is heard of it."""
         self.fallback_active = False
+
+    @property
+    def state_ns(self) -> int:
+        """When `state` was true: the plant lives in whole periods of its onboard controller."""
+        return self._time_ns - self._plant.lag_ns
 
     @property
     def state(self) -> State:

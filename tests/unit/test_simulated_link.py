@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import sim_bridge.link
 import sim_bridge.vehicle
 from lcd_flight.flight import virtual_time
 from lcd_flight.flight.virtual_time import VirtualClock
@@ -42,6 +43,7 @@ class Notes:
         self.setpoint = AttitudeThrust(0.0, LEVEL)
         self.flown: list[tuple[int, float]] = []
         self.stops = 0
+        self.lag_ns = 0
 
     def advance(self, dt_ns: int) -> None:
         self.flown.append((dt_ns, round(self.setpoint.thrust_N / VEHICLE.weight_N, 6)))
@@ -66,6 +68,7 @@ class Notes:
 @pytest.fixture(autouse=True)
 def plant_takes_notes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sim_bridge.vehicle, "Plant", Notes)
+    monkeypatch.setattr(sim_bridge.link, "warm_up", lambda context: None)
 
 
 Script = Callable[[SimulatedLink], Awaitable[None]]
@@ -154,6 +157,43 @@ def test_a_setpoint_older_than_the_newest_is_refused_and_an_equal_one_replaces_i
     run(script)
 
 
+def test_a_setpoint_that_is_not_finite_is_refused() -> None:
+    async def script(link: SimulatedLink) -> None:
+        await link.arm()
+        link.send(AttitudeThrust(math.nan, LEVEL), CLOCK.now_ns())
+        link.send(AttitudeThrust(1.0, (math.inf, 0.0, 0.0, 1.0)), CLOCK.now_ns())
+        report = link.report(CLOCK.now_ns())
+        assert (report.stale, report.sent) == (2, 0)
+
+    run(script)
+
+
+def test_the_simulation_is_compiled_before_the_vehicle_lives(monkeypatch: pytest.MonkeyPatch) -> None:
+    order: list[str] = []
+
+    class Watched(VirtualClock):
+        def now_ns(self) -> int:
+            order.append("clock")
+            return super().now_ns()
+
+    monkeypatch.setattr(sim_bridge.link, "warm_up", lambda context: order.append("compiled"))
+
+    async def script(link: SimulatedLink) -> None:
+        pass
+
+    run(script, clock=Watched())
+    assert order[0] == "compiled"
+
+
+def test_a_pose_is_stamped_with_the_time_at_which_it_was_true() -> None:
+    async def script(link: SimulatedLink) -> None:
+        Notes.newest.lag_ns = 700_000
+        await until_ms(8.0)
+
+    (frame,) = run(script)
+    assert (frame.source_time_ns, frame.send_time_ns) == (5_300_000, 6_000_000)
+
+
 def test_stop_disarm_and_closing_stop_the_motors() -> None:
     async def script(link: SimulatedLink) -> None:
         await link.arm()
@@ -205,7 +245,7 @@ def test_a_vehicle_that_dies_falls_silent_while_the_camera_still_sees_it() -> No
         await until_ms(500.0)
         report = link.report(CLOCK.now_ns())
         assert report.connected
-        assert report.age_ns == (500 - 115) * MS
+        assert report.age_ns == (500 - 116) * MS
         with pytest.raises(RefusedError, match="it has no power"):
             await link.arm()
 
@@ -255,7 +295,7 @@ def test_a_late_wake_up_goes_on_by_what_has_passed_and_skips_what_was_missed() -
         await until_ms(120.0)
 
     frames = run(script, clock=Sluggish())
-    assert [f.source_time_ns / MS for f in frames] == [5, 15, 25, 35, 82, 85, 95, 105, 115]
+    assert [f.source_time_ns / MS for f in frames] == [6, 16, 26, 36, 83, 86, 96, 106, 116]
     assert sum(dt for dt, _ in Notes.newest.flown) == 120 * MS
 
 
@@ -310,7 +350,7 @@ def test_camera_noise_has_the_stated_size_and_depends_on_seed_and_number_alone()
 
     def seen(seed: int, count: int = 2000) -> list[MocapFrame]:
         camera = Camera("cf1", seed, 0.3, 0.1, twist=True)
-        return [decode(camera.frame(state, n)) for n in range(count)]
+        return [decode(camera.frame(state, n, n)) for n in range(count)]
 
     frames = seen(1)
     assert frames[:50] == seen(1, 50)
@@ -328,5 +368,6 @@ def test_camera_noise_has_the_stated_size_and_depends_on_seed_and_number_alone()
 
 def test_a_camera_may_leave_the_twist_to_the_filter() -> None:
     state = State((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), LEVEL, (0.0, 0.0, 0.0))
-    frame = decode(Camera("cf1", 0, 0.3, 0.1, twist=False).frame(state, 0))
+    frame = decode(Camera("cf1", 0, 0.3, 0.1, twist=False).frame(state, 3, 5))
     assert (frame.velocity, frame.body_rates) == (None, None)
+    assert (frame.source_time_ns, frame.send_time_ns) == (3, 5)

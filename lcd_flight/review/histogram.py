@@ -27,6 +27,8 @@ def lateness_html(lateness_s: FloatArray, missed: int) -> Html:
     note = (
         f"{len(late_ms)} ticks, {missed} missed; late by {median:.2f} ms in the median, "
         f"{p99:.2f} ms at 99 %, {largest:.2f} ms at most."
+        if largest > 0.0
+        else f"{len(late_ms)} ticks in virtual time, where none can be late."
     )
     drawing = tag(
         "svg",

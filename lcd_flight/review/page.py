@@ -12,7 +12,7 @@ from lcd_flight.review.figures import FlightFigures, figures_of
 from lcd_flight.review.histogram import lateness_html
 from lcd_flight.review.html import Html, joined, tag
 from lcd_flight.review.plots import panels, timeline
-from lcd_flight.review.view import path_drawing
+from lcd_flight.review.view import baselines, path_drawing
 
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 """Nothing is ever loaded, whatever a log may hold."""
@@ -73,7 +73,7 @@ def _content(log: FlightLog, figures: FlightFigures, line: Timeline) -> list[Htm
 def _path(log: FlightLog, line: Timeline) -> Html:
     """The path, its legend and the slider that moves through the flight."""
     keys = [("flown", "flown"), ("reference", "reference")]
-    if any(leg.baseline is not None for leg in log.header.plan.legs):
+    if baselines(log.header.plan):
         keys.append(("baseline", "minimum snap"))
     slider = tag(
         "input",

@@ -8,7 +8,7 @@ from lcd_flight.record import FlightLog
 from lcd_flight.review.assets import asset
 from lcd_flight.review.figures import figures_of
 from lcd_flight.review.html import Html, tag
-from lcd_flight.review.view import HEIGHT, WIDTH, path_drawing
+from lcd_flight.review.view import HEIGHT, WIDTH, baselines, path_drawing
 
 _FOOT = 44
 """Height of the legend."""
@@ -42,7 +42,7 @@ def path_figure(log: FlightLog) -> Html:
 def _legend(log: FlightLog) -> list[Html]:
     """Keys from the left, and what the flight came to on the right."""
     keys = [("flown", "flown"), ("reference", "planned")]
-    if any(leg.baseline is not None for leg in log.header.plan.legs):
+    if baselines(log.header.plan):
         keys.append(("baseline", "minimum snap"))
     parts = []
     for number, (style, name) in enumerate(keys):

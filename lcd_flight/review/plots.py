@@ -71,7 +71,7 @@ def _error(log: FlightLog) -> Panel:
     limits, predicted = log.header.limits, log.header.predicted_max_error_m
     error_m = log.series.error_m
     known = error_m[np.isfinite(error_m)]
-    top = max(2.0, 1.3 * float(known.max(initial=0.0)))
+    top = max(3.0, 1.3 * float(known.max(initial=0.0)))
     rules = [
         Rule(f"{limits.max_position_error_m:g} m: land at once", limits.max_position_error_m, "limit"),
         Rule(f"{limits.brake_position_error_m:g} m: brake", limits.brake_position_error_m, "warning"),

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lcd_flight.model import Trajectory
+from lcd_flight.model import FlightPlan, Trajectory
 from lcd_flight.model.types import FloatArray
 from lcd_flight.record import FlightLog
 from lcd_flight.review.html import Html, tag
@@ -83,13 +83,21 @@ def path_drawing(log: FlightLog) -> Html:
     )
 
 
+def baselines(plan: FlightPlan) -> list[Trajectory]:
+    """The minimum-snap plans that were not flown; none where the plan is minimum snap itself."""
+    return [
+        leg.baseline
+        for leg in plan.legs
+        if leg.baseline is not None and not np.array_equal(leg.baseline.coefficients, leg.trajectory.coefficients)
+    ]
+
+
 def _space(log: FlightLog) -> _Space:
     plan, fence, series = log.header.plan, log.header.limits.geofence, log.series
     ticks = np.flatnonzero(airborne(series) & np.isfinite(series.p_WB).all(axis=1))
     ticks = ticks[:: max(1, math.ceil(len(ticks) / _MOST_FLOWN_POINTS))]
     reference = _sampled(plan.joined())
     waypoints = [leg.waypoints[:, :3] for leg in plan.legs if leg.waypoints is not None]
-    baselines = tuple(_sampled(leg.baseline) for leg in plan.legs if leg.baseline is not None)
     near = np.concatenate([reference, series.p_WB[ticks], *waypoints])
     low, high = near.min(axis=0), near.max(axis=0)
     fence_low, fence_high = np.array(fence.low_m), np.array(fence.high_m)
@@ -99,7 +107,7 @@ def _space(log: FlightLog) -> _Space:
         flown=series.p_WB[ticks],
         flown_time_s=series.time_s[ticks],
         reference=reference,
-        baselines=baselines,
+        baselines=tuple(_sampled(trajectory) for trajectory in baselines(plan)),
         waypoints=np.concatenate(waypoints) if waypoints else np.empty((0, 3)),
         low=low,
         high=high,
@@ -110,7 +118,7 @@ def _space(log: FlightLog) -> _Space:
 def _view(space: _Space) -> View:
     """The path and the floor below it, as large as they fit; the fence may run out of the drawing."""
     path = np.concatenate([space.reference, space.flown, *space.baselines, space.waypoints])
-    seen = np.concatenate([path, _on_floor(path, space)])
+    seen = np.concatenate([path, _on_floor(path, space), _triad_corner(space)[None]])
     center = (seen.min(axis=0) + seen.max(axis=0)) / 2.0
     unit = View((float(center[0]), float(center[1]), float(center[2])), 1.0)
     reach = np.abs(unit.project(seen) - (WIDTH / 2, HEIGHT / 2)).max(axis=0)
@@ -195,9 +203,13 @@ def _floor(space: _Space) -> Iterator[FloatArray]:
 
 def _triad(space: _Space, view: View) -> Iterator[Html]:
     """Which way is x, y and z: lines of half a metre on the floor, in front of the path."""
-    (x0, y0, _), (x1, _, _) = space.reference.min(axis=0), space.reference.max(axis=0)
-    corner = np.array([(x0 + x1) / 2.0, y0 - 0.3, space.floor_m])
+    corner = _triad_corner(space)
     for axis, name in enumerate("xyz"):
         end = corner + 0.5 * np.eye(3)[axis]
         yield _line(np.stack([corner, end]), view, f"axis {name}")
         yield _mark(end, view, f"axis {name}", name)
+
+
+def _triad_corner(space: _Space) -> FloatArray:
+    (x0, y0, _), (x1, _, _) = space.reference.min(axis=0), space.reference.max(axis=0)
+    return np.array([(x0 + x1) / 2.0, y0 - 0.3, space.floor_m])

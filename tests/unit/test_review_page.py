@@ -14,7 +14,7 @@ import pytest
 import synthetic_flight
 from synthetic_flight import log_of
 
-from lcd_flight.model import Finding, PoseReport, Severity
+from lcd_flight.model import Finding, FlightPlan, PoseReport, Severity
 from lcd_flight.record import FlightLog
 from lcd_flight.review import write_page, write_path_figure
 from lcd_flight.review.page import page
@@ -222,3 +222,15 @@ def test_the_still_is_a_picture_of_its_own(log: FlightLog, tmp_path: Path) -> No
     assert "prefers-color-scheme: dark" in text
     assert "largest error 0.10 m" in text
     assert path.stat().st_size < 150_000
+
+
+def test_a_minimum_snap_plan_is_not_compared_with_itself() -> None:
+    legs = [replace(leg, baseline=leg.trajectory) for leg in synthetic_flight.plan().legs]
+    log = log_of(synthetic_flight.flight(), plan=FlightPlan(tuple(legs)))
+    assert outline(page(log)).count("polyline", "baseline") == 0
+    assert "minimum snap" not in page(log)
+
+
+def test_virtual_time_is_not_praised_for_being_punctual() -> None:
+    pairs = [(replace(i, deadline_ns=i.now_ns), t) for i, t in synthetic_flight.flight()]
+    assert "971 ticks in virtual time, where none can be late." in page(log_of(pairs))

@@ -82,6 +82,7 @@ def _spot(plan: FlightPlan, mission: Mission, time_s: float) -> Spot:
     return Spot(
         place=leg_place(leg, mission),
         leg=index,
+        kind=leg.kind,
         segment=min(segment, leg.trajectory.segments - 1),
         time_s=time_s,
         leg_time_s=leg_time_s,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lcd_flight.model import BoolArray, FloatArray, RefusedError, Vector3
+from lcd_flight.model import BoolArray, FloatArray, LegKind, RefusedError, Vector3
 
 QUANTILE = 0.95
 
@@ -19,8 +19,9 @@ class Spot:
     """Part of the mission, e.g. `missions/x.yaml:20: plan[2].trajectory`."""
     leg: int
     """Index into the plan's legs."""
+    kind: LegKind
     segment: int
-    """Of the leg, from 0: between its waypoints `segment` and `segment + 1`."""
+    """Of the leg, from 0."""
     time_s: float
     """From the start of the flight, without waits to settle."""
     leg_time_s: float
@@ -31,7 +32,9 @@ class Spot:
     def __str__(self) -> str:
         """For a message."""
         point = "({:.2f}, {:.2f}, {:.2f})".format(*self.p_W)
-        return f"{self.place}, segment {self.segment + 1}, {self.leg_time_s:.1f} s into it, near {point}"
+        on_trajectory = self.kind is LegKind.TRAJECTORY
+        between = f" between waypoints {self.segment + 1} and {self.segment + 2}," if on_trajectory else ""
+        return f"{self.place} at {self.leg_time_s:.2f} s,{between} near {point}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

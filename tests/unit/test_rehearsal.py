@@ -150,8 +150,8 @@ def test_a_refusal_says_where_and_what_helps() -> None:
         told([0.9], time_s=5.0).require()
     assert str(caught.value) == (
         "rehearsal: 20/20 runs completed, max error 0.90 m (p95 0.90, limit 0.75), longest saturation 190 ms: refused; "
-        "worst in plan[1].trajectory, segment 2, 2.0 s into it, near (1.45, 1.39, 1.00); lower planner.speed, "
-        "let planner.type be learned, or look at the faults in rehearse.faults"
+        "worst in plan[1].trajectory at 2.00 s, between waypoints 2 and 3, near (1.45, 1.39, 1.00); "
+        "lower planner.speed, let planner.type be learned, or look at the faults in rehearse.faults"
     )
 
 
@@ -231,3 +231,7 @@ def test_batches_are_judged_together() -> None:
     assert found.runs == 601
     assert found.max_error_m == 2.0
     assert int(found.completed.sum()) == 600
+
+
+def test_a_spot_off_the_trajectories_names_no_waypoints() -> None:
+    assert str(told([0.9], time_s=0.5).worst).startswith("plan[0].takeoff at 0.50 s, near (0.00, 0.00, ")

@@ -9,7 +9,7 @@ import numpy as np
 
 from lcd_flight.mission.mission import Mission
 from lcd_flight.mission.path_checks import leg_place
-from lcd_flight.model import FlightPlan, RolloutLabels, RolloutOptions, Simulator, Trajectories, Vehicle
+from lcd_flight.model import FlightPlan, FloatArray, RolloutLabels, RolloutOptions, Simulator, Trajectories, Vehicle
 from lcd_flight.rehearsal.faults import noise_seeds, pose_gaps
 from lcd_flight.rehearsal.verdict import Rehearsal, Spot
 
@@ -60,31 +60,41 @@ def _fly(
 def judge(labels: RolloutLabels, plan: FlightPlan, mission: Mission) -> Rehearsal:
     """The verdict on flown runs; an error that is not a number counts as a crash."""
     errors = np.where(np.isfinite(labels.max_error_m), labels.max_error_m, np.inf)
-    lands_at_m = mission.safety.max_position_error_m
+    lands_at_m, limit_m = mission.safety.max_position_error_m, mission.safety.max_predicted_error_m
     completed = ~labels.crashed & (errors <= lands_at_m)
     worst = int(np.argmax(np.where(completed, errors, errors + errors.max() + 1.0)))
+    segment = _segment(labels.segment_max_error_m[worst], limit_m)
     return Rehearsal(
         errors_m=errors,
         completed=np.asarray(completed),
         longest_saturation_s=float(labels.longest_saturation_s.max()),
-        limit_m=mission.safety.max_predicted_error_m,
-        worst=_spot(plan, mission, float(labels.max_error_time_s[worst])),
+        limit_m=limit_m,
+        where=_spot(plan, mission, segment, float(labels.max_error_time_s[worst])),
     )
 
 
-def _spot(plan: FlightPlan, mission: Mission, time_s: float) -> Spot:
-    """What the plan does at an instant of the joined flight."""
-    ends = np.cumsum([leg.duration_s for leg in plan.legs])
-    index = min(int(np.searchsorted(ends, time_s, side="left")), len(plan.legs) - 1)
+def _segment(errors_m: FloatArray, limit_m: float) -> int:
+    """The first segment with an error above the limit, else the worst: a lost vehicle is furthest off at the end."""
+    reached = np.nan_to_num(errors_m, nan=-np.inf)
+    beyond = np.flatnonzero(reached > limit_m)
+    return int(beyond[0]) if len(beyond) else int(np.argmax(reached))
+
+
+def _spot(plan: FlightPlan, mission: Mission, segment: int, worst_time_s: float) -> Spot:
+    """A segment of the joined flight, at the worst instant within it: where that came later, at its end."""
+    lasts = np.cumsum([leg.trajectory.segments for leg in plan.legs])
+    index = int(np.searchsorted(lasts, segment, side="right"))
     leg = plan.legs[index]
-    leg_time_s = float(np.clip(time_s - (ends[index] - leg.duration_s), 0.0, leg.duration_s))
-    segment = int(np.searchsorted(leg.trajectory.knot_times_s[1:], leg_time_s, side="left"))
+    began_s = sum(before.duration_s for before in plan.legs[:index])
+    own = segment - (int(lasts[index]) - leg.trajectory.segments)
+    knots = leg.trajectory.knot_times_s
+    leg_time_s = float(np.clip(worst_time_s - began_s, knots[own], knots[own + 1]))
     return Spot(
         place=leg_place(leg, mission),
         leg=index,
         kind=leg.kind,
-        segment=min(segment, leg.trajectory.segments - 1),
-        time_s=time_s,
+        segment=own,
+        time_s=began_s + leg_time_s,
         leg_time_s=leg_time_s,
         p_W=leg.trajectory.reference(leg_time_s).p_W,
     )

@@ -49,8 +49,8 @@ class Rehearsal:
     """The longest that a motor was at its limit, over all runs."""
     limit_m: float
     """safety.max_predicted_error."""
-    worst: Spot
-    """Where the worst run was worst."""
+    where: Spot
+    """Where the worst run first exceeded the limit; where it was worst if it did not."""
 
     @property
     def runs(self) -> int:
@@ -80,7 +80,7 @@ class Rehearsal:
             f"{int(self.completed.sum())}/{self.runs} runs completed, max error {self.max_error_m:.2f} m "
             f"(p95 {self.p95_error_m:.2f}, limit {self.limit_m:g}), {saturation}"
         )
-        return f"{found}: pass" if self.passed else f"{found}: refused; worst in {self.worst}"
+        return f"{found}: pass" if self.passed else f"{found}: refused; trouble begins in {self.where}"
 
     def require(self) -> None:
         """Do nothing if it passed.

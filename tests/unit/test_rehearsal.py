@@ -20,7 +20,8 @@ from lcd_flight.model import (
     Vehicle,
 )
 from lcd_flight.rehearsal import Rehearsal, rehearse
-from lcd_flight.rehearsal.faults import pose_gaps
+from lcd_flight.rehearsal.faults import noise_seeds, pose_gaps
+from lcd_flight.rehearsal.rehearse import judge
 from lcd_flight.worlds import load_vehicle
 
 VEHICLE = load_vehicle("crazyflie")
@@ -62,8 +63,10 @@ class Told:
         count, segments = plans.durations_s.shape
         errors = np.resize(np.array(self.errors_m), done + count)[done:]
         zeros = dict.fromkeys(RolloutLabels.__dataclass_fields__, np.zeros(count))
+        reached = np.searchsorted(plans[0].knot_times_s[1:-1], self.time_s)
+        by_segment = np.where(np.arange(segments) == reached, errors[:, None], np.minimum(errors[:, None], 0.01))
         shapes = {
-            "segment_max_error_m": np.zeros((count, segments)),
+            "segment_max_error_m": by_segment,
             "waypoint_error_m": np.zeros((count, segments + 1)),
         }
         said = {
@@ -139,7 +142,7 @@ def test_an_error_that_is_no_number_is_refused() -> None:
 )
 def test_where_it_was_worst(time_s: float, leg: int, segment: int, leg_time_s: float) -> None:
     # take-off 2 s, transfer 1 s, trajectory 1 s + 2 s, transfer, landing
-    spot = told([0.9], time_s=time_s).worst
+    spot = told([0.9], time_s=time_s).where
     assert (spot.leg, spot.segment) == (leg, segment)
     assert spot.leg_time_s == pytest.approx(leg_time_s)
     assert spot.p_W == PLAN.legs[leg].trajectory.reference(spot.leg_time_s).p_W
@@ -150,7 +153,7 @@ def test_a_refusal_says_where_and_what_helps() -> None:
         told([0.9], time_s=5.0).require()
     assert str(caught.value) == (
         "rehearsal: 20/20 runs completed, max error 0.90 m (p95 0.90, limit 0.75), longest saturation 190 ms: refused; "
-        "worst in plan[1].trajectory at 2.00 s, between waypoints 2 and 3, near (1.45, 1.39, 1.00); "
+        "trouble begins in plan[1].trajectory at 2.00 s, between waypoints 2 and 3, near (1.45, 1.39, 1.00); "
         "lower planner.speed, let planner.type be learned, or look at the faults in rehearse.faults"
     )
 
@@ -234,4 +237,22 @@ def test_batches_are_judged_together() -> None:
 
 
 def test_a_spot_off_the_trajectories_names_no_waypoints() -> None:
-    assert str(told([0.9], time_s=0.5).worst).startswith("plan[0].takeoff at 0.50 s, near (0.00, 0.00, ")
+    assert str(told([0.9], time_s=0.5).where).startswith("plan[0].takeoff at 0.50 s, near (0.00, 0.00, ")
+
+
+def test_trouble_is_told_where_it_begins_not_where_it_ends() -> None:
+    """A lost vehicle is furthest off at the end of the flight."""
+    simulator = Told([5.0], time_s=7.5)
+    labels = simulator.rollout(Trajectories.stack([PLAN.joined()]), VEHICLE, noise_seeds(0, 0, 1), RolloutOptions())
+    labels.segment_max_error_m[0] = [0.1, 0.1, 0.3, 0.9, 4.0, 5.0]
+    where = judge(labels, PLAN, mission()).where
+    assert (where.leg, where.segment, where.leg_time_s) == (2, 1, 3.0)
+    assert where.time_s == pytest.approx(6.0)
+
+
+def test_segments_that_were_never_reached_are_nowhere() -> None:
+    simulator = Told([0.5], time_s=3.5, valid=False)
+    labels = simulator.rollout(Trajectories.stack([PLAN.joined()]), VEHICLE, noise_seeds(0, 0, 1), RolloutOptions())
+    labels.segment_max_error_m[0] = [0.1, 0.1, 0.5, np.nan, np.nan, np.nan]
+    found = judge(labels, PLAN, mission())
+    assert (found.where.leg, found.where.segment, found.passed) == (2, 0, False)

@@ -53,7 +53,7 @@ def test_a_gentle_flight_passes_with_all_faults() -> None:
 def test_a_flight_beyond_the_motors_is_refused_where_it_is_fast() -> None:
     found = rehearsed(3.5, ["motor_noise"])
     assert found.longest_saturation_s > 0.1
-    with pytest.raises(RefusedError, match=r"refused; worst in plan\[1\]\.trajectory at .* between waypoints"):
+    with pytest.raises(RefusedError, match=r"refused; trouble begins in plan\[1\]\.trajectory at .* between waypoints"):
         found.require()
 
 

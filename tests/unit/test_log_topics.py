@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import jsonschema
@@ -91,3 +92,10 @@ def test_protobuf_schemas_are_whole(topic: Topic) -> None:
     for file in FileDescriptorSet.FromString(topic.schema_data()).file:
         pool.Add(file)  # fails where a dependency does not come first
     assert pool.FindMessageTypeByName(topic.schema_name).full_name.startswith("foxglove.")
+
+
+def test_the_documentation_has_the_same_table() -> None:
+    text = (Path(__file__).parents[2] / "docs" / "flight_log.md").read_text(encoding="utf-8")
+    for topic in TOPICS:
+        row = f"| `{topic.name}` | `{topic.schema_name}` | {topic.encoding} | {topic.rate} | {topic.units} |"
+        assert row in text

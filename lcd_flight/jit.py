@@ -54,7 +54,9 @@ class Compiler:
         if function not in self._helpers:
             import numba
 
-            self._helpers[function] = numba.njit(forceinline=True, **self._options)(_relink(function, self._inlined))
+            # A loop over vehicles is vectorised only where nothing is called; nobody but kernels calls the helpers.
+            inlined = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+            self._helpers[function] = numba.njit(**inlined, **self._options)(_relink(function, self._inlined))
         return self._helpers[function]
 
     def _cache(self) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,7 +13,7 @@ from lcd_flight.cli.terminal import Terminal, following
 from lcd_flight.errors import InputError, Outcome
 
 if TYPE_CHECKING:
-    from lcd_flight.learning.evaluate import Evaluation
+    from lcd_flight.learning.evaluate import Evaluation, MethodFigures
 
 
 def evaluate(
@@ -62,25 +63,28 @@ def evaluate(
     return terminal.finish(Outcome.OK, evaluation.as_json())
 
 
+COLUMNS: dict[str, Callable[[MethodFigures], str]] = {
+    "crash %": lambda row: f"{row.crash_rate:.1f}",
+    "+-": lambda row: "" if row.crash_rate_error is None else f"{row.crash_rate_error:.1f}",
+    "max m": lambda row: f"{row.median_max_error_m:.2f}",
+    "waypoint m": lambda row: f"{row.median_waypoint_error_m:.2f}",
+    "snap x": lambda row: f"{row.median_relative_snap:.2f}",
+    "plan ms": lambda row: f"{row.plan_time_ms:.2f}",
+}
+"""Of the table for people: title and text. Errors are medians over the flights of their largest."""
+
+
 def _show(terminal: Terminal, evaluation: Evaluation) -> None:
     """The table for people."""
     from rich.table import Table
 
-    table = Table(title=f"{evaluation.world}: crash rate, largest position error above 1.5 m")
-    table.add_column("method")
-    for column in ("crash %", "std. error", "tasks x noise", "median max m", "waypoint m", "snap ratio", "plan ms"):
-        table.add_column(column, justify="right")
+    if terminal.quiet:
+        return
+    rows = next(iter(evaluation.methods.values()))
+    table = Table(title=f"{evaluation.world}: {rows.tasks} tasks x {rows.noise_seeds} noise seeds")
+    table.add_column("method", no_wrap=True)
+    for title in COLUMNS:
+        table.add_column(title, justify="right", no_wrap=True)
     for name, row in evaluation.methods.items():
-        error = "" if row.crash_rate_error is None else f"{row.crash_rate_error:.1f}"
-        table.add_row(
-            name,
-            f"{row.crash_rate:.1f}",
-            error,
-            f"{row.tasks} x {row.noise_seeds}",
-            f"{row.median_max_error_m:.2f}",
-            f"{row.median_waypoint_error_m:.2f}",
-            f"{row.median_relative_snap:.2f}",
-            f"{row.plan_time_ms:.2f}",
-        )
-    if not terminal.quiet:
-        terminal.console.print(table)
+        table.add_row(name, *(text(row) for text in COLUMNS.values()))
+    terminal.console.print(table)

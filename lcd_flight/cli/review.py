@@ -15,6 +15,7 @@ from lcd_flight.errors import Outcome
 def review(
     log: Annotated[Path, typer.Argument(metavar="LOG", help="A flight's .mcap file, whole or cut.")],
     out: Annotated[Path | None, typer.Option(help="The page to write; beside the log otherwise.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="Also write a still of the path, as SVG.")] = None,
     json: Json = False,
     quiet: Quiet = False,
     no_color: NoColor = False,
@@ -23,11 +24,14 @@ def review(
     from lcd_flight.record import read_log
     from lcd_flight.review.figures import figures_of
     from lcd_flight.review.page import write_page
+    from lcd_flight.review.path_figure import write_path_figure
 
     terminal = Terminal(json_line=json, quiet=quiet, color=not no_color)
     flight = read_log(log)
     figures = figures_of(flight).to_json()
     page = write_page(flight, out or log.with_suffix(".html"))
+    if picture is not None:
+        write_path_figure(flight, picture)
     terminal.line("REVIEW", str(page))
     for key, value in figures.items():
         terminal.detail(f"{key:<28} {_text(value)}")

@@ -36,5 +36,7 @@ def refusal(endpoint: str, error: zmq.ZMQError) -> RefusedError:
         case errno.EACCES:
             text = f"{where} needs more rights than this user has: choose a port above 1023, or another file"
         case _:
-            text = f"{where} cannot be opened ({os.strerror(error.errno or 0)}): write it as tcp://HOST:PORT or ipc://FILE"
+            text = (
+                f"{where} cannot be opened ({os.strerror(error.errno or 0)}): write it as tcp://HOST:PORT or ipc://FILE"
+            )
     return RefusedError(text)

@@ -1,1 +1,1 @@
-"""Flying: phases, the pure tick, clocks and the asyncio loop that holds 100 Hz."""
+"""Flying a plan: the phases, the pure tick, the loop that runs it, and the session around them."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from lcd_flight.flight.setup import FlightSetup, Memory
 from lcd_flight.model import (
     GRAVITY_M_PER_S2,
@@ -13,10 +15,14 @@ from lcd_flight.model import (
     Vehicle,
 )
 from lcd_flight.model.frames import body_z_axis
-from lcd_flight.safety.evidence import SafetyMemory, pose_seen
+from lcd_flight.safety.evidence import SafetyMemory, pose_gap_s, pose_seen
 
 HOVER_SMOOTHING_S = 1.0
 """Time constant of the hover thrust."""
+HOVER_SPEED = 0.3
+"""m/s, of the reference: up to here it counts as hovering."""
+HOVER_ACCELERATION = 0.3
+"""m/s^2, of the reference."""
 HOVER_SHARES = (0.85, 1.15)
 """Of the weight: how far the hover thrust is believed to be from it."""
 
@@ -26,9 +32,7 @@ def estimate(inputs: TickInputs, setup: FlightSetup, memory: Memory, dt_s: float
     usable, safety = pose_seen(inputs, memory.safety)
     if usable:
         return inputs.pose.state, safety
-    if safety.seen_ns is None or memory.state is None:
-        return None, safety
-    if (inputs.now_ns - safety.seen_ns) * 1e-9 > setup.limits.pose_timeout_s:
+    if memory.state is None or pose_gap_s(inputs, safety) > setup.limits.pose_timeout_s:
         return None, safety
     if memory.setpoint is None or not memory.phase.airborne:
         return memory.state, safety
@@ -51,16 +55,23 @@ def predicted(state: State, setpoint: AttitudeThrust, vehicle: Vehicle, dt_s: fl
 
 
 def hover_thrust_N(
-    memory: Memory, setpoint: AttitudeThrust | None, reference: Reference | None, vehicle: Vehicle, dt_s: float
+    memory: Memory,
+    setpoint: AttitudeThrust | None,
+    state: State | None,
+    reference: Reference | None,
+    vehicle: Vehicle,
+    dt_s: float,
 ) -> float | None:
-    """The thrust that carries this vehicle, learned while the plan is followed; before that None.
+    """The thrust that carries this vehicle, learned while the plan has it hover; before that None.
 
     A battery that sags and a thrust map that is a little wrong make it differ from the weight by more than a level
-    descent is below it. The vertical part of the thrust asked for, less what the plan's own acceleration takes.
+    descent is below it.
     """
-    if memory.phase not in (Phase.HOLD, Phase.TRACK) or setpoint is None or reference is None:
+    if memory.phase not in (Phase.HOLD, Phase.TRACK) or setpoint is None or state is None or reference is None:
         return memory.hover_N
-    seen_N = setpoint.thrust_N * body_z_axis(setpoint.q_WB)[2] - vehicle.mass_kg * reference.a_W[2]
+    if math.hypot(*reference.v_W) > HOVER_SPEED or math.hypot(*reference.a_W) > HOVER_ACCELERATION:
+        return memory.hover_N
+    seen_N = setpoint.thrust_N * body_z_axis(state.q_WB)[2]
     before_N = vehicle.weight_N if memory.hover_N is None else memory.hover_N
     now_N = before_N + dt_s / (HOVER_SMOOTHING_S + dt_s) * (seen_N - before_N)
     return min(max(now_N, HOVER_SHARES[0] * vehicle.weight_N), HOVER_SHARES[1] * vehicle.weight_N)

@@ -35,7 +35,7 @@ class Event(IntEnum):
     DESCEND = 12
     KILL = 13
     CRASHED = 14
-    """The vehicle says so itself."""
+    """The vehicle says so itself, or it is seen on the ground."""
 
 
 OF_COMMAND: Mapping[Command, Event] = {

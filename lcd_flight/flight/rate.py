@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from lcd_flight.flight.setup import PERIOD_NS
 from lcd_flight.model import Clock
+from lcd_flight.safety.evidence import PERIOD_NS
 
 
 @dataclass(frozen=True, slots=True)

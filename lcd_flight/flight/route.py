@@ -9,6 +9,7 @@ from lcd_flight.flight.manoeuvres import go_to, land_from, stop
 from lcd_flight.flight.phases import OF_LEG, Event
 from lcd_flight.flight.setup import FlightSetup, Memory, Route
 from lcd_flight.model import Finding, Leg, Phase, Reference, Severity, State, Vector3
+from lcd_flight.model.frames import tilt_of
 
 SMOOTHING_S = 0.2
 """Time constant of the velocity that settling and touchdown are judged by."""
@@ -23,8 +24,17 @@ TOUCHDOWN_S = 0.3
 """Standing for so long on too little thrust to hover is touchdown."""
 TOUCHDOWN_THRUST_SHARE = 0.8
 """Of the thrust at which this flight hovers: in the air it would be 0.6 m/s fast after the time above."""
+HARD_LANDING_SPEED = 2.0
+"""m/s: a vehicle that came down faster of late has crashed."""
+SINK_FADE = 1.5
+"""m/s^2, how fast the memory of a high sink speed fades in a vehicle that moves."""
+LYING_RAD = math.radians(45.0)
+"""A vehicle at rest that is tilted more has crashed."""
 BLIND_TOUCHDOWN_M = 0.1
 """Height above the ground below which a vehicle that stands has landed, where thrust is constant and tells nothing."""
+
+HARD_LANDING = "hard_landing"
+LYING = "lies_tilted"
 
 ON_THE_WAY = frozenset({Phase.TAKEOFF, Phase.HOLD, Phase.TRACK})
 GOING_DOWN = frozenset({Phase.LAND, Phase.LAND_NOW, Phase.DESCEND_BLIND})
@@ -46,6 +56,7 @@ def moved_on(memory: Memory, setup: FlightSetup, state: State | None, dt_s: floa
         on_leg=route.on_leg,
         calm_s=route.calm_s + dt_s if still and near else 0.0,
         grounded_s=route.grounded_s + dt_s if still and _is_carried(memory, setup, state) else 0.0,
+        sink_speed=_sink_speed(route, state, 0.0 if still else dt_s),
         v_smooth_W=v_smooth_W,
     )
     return moved, reference
@@ -77,13 +88,23 @@ def next_leg(route: Route, setup: FlightSetup, phase: Phase) -> tuple[Event | No
     return Event.LAND if following is None else OF_LEG[following.kind], findings
 
 
-def touched_down(route: Route, phase: Phase) -> bool:
-    """Whether a vehicle that is to land stands on something."""
-    return phase in GOING_DOWN and route.grounded_s >= TOUCHDOWN_S
+def ground_contact(route: Route, phase: Phase, state: State | None) -> tuple[Event | None, tuple[Finding, ...]]:
+    """Touchdown of a vehicle that is to land and stands; a crash where it fell there, or lies on its side."""
+    if phase not in GOING_DOWN or route.grounded_s < TOUCHDOWN_S or state is None:
+        return None, ()
+    tilt_rad = tilt_of(state.q_WB)
+    if route.sink_speed > HARD_LANDING_SPEED:
+        text = f"hit the ground at {route.sink_speed:.1f} m/s"
+        return Event.CRASHED, (Finding(HARD_LANDING, Severity.KILL, text, route.sink_speed, HARD_LANDING_SPEED),)
+    if tilt_rad > LYING_RAD:
+        text = f"lies on the ground, tilted by {math.degrees(tilt_rad):.0f} deg"
+        return Event.CRASHED, (Finding(LYING, Severity.KILL, text, tilt_rad, LYING_RAD),)
+    return Event.TOUCHDOWN, ()
 
 
 def begun(route: Route, setup: FlightSetup, before: Phase, phase: Phase, state: State) -> Route:
     """The route as a phase is entered, or as the next leg begins; call it only then."""
+    route = replace(route, sink_speed=0.0)
     if before in (Phase.ARMED, *ON_THE_WAY) and phase in (Phase.LAND, *ON_THE_WAY):
         return _leg_begun(route, setup)
     if phase is Phase.BRAKE_HOLD:
@@ -120,6 +141,12 @@ def _settles(route: Route, setup: FlightSetup) -> bool:
 
 def _leg(setup: FlightSetup, index: int) -> Leg | None:
     return setup.plan.legs[index] if 0 <= index < len(setup.plan.legs) else None
+
+
+def _sink_speed(route: Route, state: State | None, moving_s: float) -> float:
+    """The highest of late; it fades while the vehicle moves, so that one that fell and lies still is known by it."""
+    sinking = 0.0 if state is None else -state.v_WB_W[2]
+    return max(sinking, route.sink_speed - SINK_FADE * moving_s, 0.0)
 
 
 def _smoothed(v_W: Vector3, state: State | None, dt_s: float) -> Vector3:

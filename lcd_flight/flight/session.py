@@ -95,10 +95,11 @@ async def fly(
         for observer in observers:
             stack.callback(observer.close)
         stack.enter_context(options.operator.listening())
+        # First, so that the threads of link and pose source get the priority too.
+        notes = () if options.fast else stack.enter_context(realtime())
         pose, link = await _opened(stack, mission, plan, vehicle, options, clock)
         if progress is not None:
             progress(Connected(options.uri or mission.vehicle.uri, link.description))
-        notes = () if options.fast else stack.enter_context(realtime())
         loop = FlightLoop(setup, clock, link, pose, options.operator, listeners)
         direction = await _flown(loop, link, clock, setup, options, progress)
         return FlightResult(

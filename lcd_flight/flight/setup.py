@@ -23,9 +23,6 @@ from lcd_flight.safety.evidence import SafetyMemory
 from lcd_flight.safety.gate import GateLimits
 from lcd_flight.safety.monitors import Monitor, monitors
 
-PERIOD_NS = 10_000_000
-"""Of the control loop: 100 Hz."""
-
 
 class ControlLaw(Protocol):
     """From state and reference to a setpoint; the integral goes in and comes out."""
@@ -89,6 +86,8 @@ class Route:
     """For how long the vehicle has stood still at the reference."""
     grounded_s: float = 0.0
     """For how long it has stood still although its thrust does not carry it."""
+    sink_speed: float = 0.0
+    """m/s downwards, the highest of late."""
     v_smooth_W: Vector3 = (0.0, 0.0, 0.0)
     """m/s, velocity with noise averaged out."""
 

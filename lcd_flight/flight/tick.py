@@ -11,8 +11,8 @@ import math
 from lcd_flight.flight.estimate import estimate, hover_thrust_N
 from lcd_flight.flight.manoeuvres import blind_time_s
 from lcd_flight.flight.phases import OF_COMMAND, OF_SEVERITY, TIME_LIMITS_S, Event, advance
-from lcd_flight.flight.route import begun, moved_on, next_leg, touched_down
-from lcd_flight.flight.setup import PERIOD_NS, FlightSetup, Memory, Route
+from lcd_flight.flight.route import HARD_LANDING, LYING, begun, ground_contact, moved_on, next_leg
+from lcd_flight.flight.setup import FlightSetup, Memory, Route
 from lcd_flight.flight.steering import Steering, saturated, steer
 from lcd_flight.model import (
     Command,
@@ -26,7 +26,7 @@ from lcd_flight.model import (
     TickInputs,
     Vector3,
 )
-from lcd_flight.safety.evidence import SafetyMemory, Scope, gather
+from lcd_flight.safety.evidence import PERIOD_NS, SafetyMemory, Scope, gather
 from lcd_flight.safety.monitors import VEHICLE_CRASHED, judge
 
 MAX_STEP_S = 0.05
@@ -34,7 +34,12 @@ MAX_STEP_S = 0.05
 
 EXPIRED = "phase_expired"
 
-_OF_CODE = {EXPIRED: Event.EXPIRED, VEHICLE_CRASHED: Event.CRASHED}
+_OF_CODE = {
+    EXPIRED: Event.EXPIRED,
+    VEHICLE_CRASHED: Event.CRASHED,
+    HARD_LANDING: Event.CRASHED,
+    LYING: Event.CRASHED,
+}
 """Findings that lead to an event of their own, whatever their severity."""
 
 _ORDERS = {
@@ -50,13 +55,10 @@ def tick(inputs: TickInputs, setup: FlightSetup, memory: Memory) -> tuple[Tick, 
     state, safety = estimate(inputs, setup, memory, dt_s)
     route, reference = moved_on(memory, setup, state, dt_s)
     judged, safety = _judged(inputs, setup, memory, safety, state, reference)
-    leg_event, waits = next_leg(route, setup, memory.phase)
-    findings = (*judged, *waits, *_orders(inputs), *_expiry(inputs, memory))
-    events = _events(inputs, findings)
-    if leg_event is not None:
-        events.append(leg_event)
-    if touched_down(route, memory.phase):
-        events.append(Event.TOUCHDOWN)
+    leg_event, on_leg = next_leg(route, setup, memory.phase)
+    ground_event, on_ground = ground_contact(route, memory.phase, state)
+    findings = (*judged, *on_leg, *on_ground, *_orders(inputs), *_expiry(inputs, memory))
+    events = [*_events(inputs, findings), *(e for e in (leg_event, ground_event) if e is not None)]
     phase = advance(memory.phase, events)
     known = state or memory.state
     if known is not None and (phase is not memory.phase or leg_event is not None):
@@ -181,7 +183,7 @@ def _remembered(
         integral=steering.integral,
         invalid_commands=steering.invalid_commands,
         saturated=decided.saturated,
-        hover_N=hover_thrust_N(memory, decided.setpoint, decided.reference, setup.vehicle, decided.dt_s),
+        hover_N=hover_thrust_N(memory, decided.setpoint, state, decided.reference, setup.vehicle, decided.dt_s),
         blind_s=blind_s,
         route=route,
         safety=safety,

@@ -8,10 +8,14 @@ from enum import IntEnum
 
 from lcd_flight.model import State, Telemetry, TickInputs
 
+PERIOD_NS = 10_000_000
+"""Of the control loop: 100 Hz."""
 SATURATION_TICKS = 50
 """Window of the saturation share: 0.5 s."""
 SKIPPED_TICKS = 100
 """Window of the share of skipped ticks: 1 s."""
+IMPLAUSIBLE = 1e6
+"""m, m/s or rad/s that no state has; the pose filter's own gate is far narrower."""
 
 
 class Scope(IntEnum):
@@ -50,7 +54,7 @@ class Evidence:
     skipped_share: float
     """Of the deadlines of the last second."""
     pose_gap_s: float
-    """Since the newest pose that could be used; infinite before the first."""
+    """`pose_gap_s` of this tick."""
     pose_rate_hz: float
     rejected: int
     """Frames since the tick before."""
@@ -70,11 +74,23 @@ class Evidence:
 
 
 def pose_seen(inputs: TickInputs, memory: SafetyMemory) -> tuple[bool, SafetyMemory]:
-    """Whether this tick's pose can be used, that is valid and finite; and the memory with it noted."""
+    """Whether this tick's pose can be used, that is there and plausible; and the memory with it noted."""
     pose = inputs.pose
-    if pose.state is None or pose.age_ns is None or not _is_finite(pose.state):
+    if pose.state is None or pose.age_ns is None or not _is_plausible(pose.state):
         return False, memory
     return True, replace(memory, seen_ns=inputs.now_ns - pose.age_ns)
+
+
+def pose_gap_s(inputs: TickInputs, memory: SafetyMemory) -> float:
+    """Time since the newest pose that could be used, infinite before the first.
+
+    What this loop itself has just slept through does not count: no pose could be used in that time. It is judged by
+    `loop_slow`, and a pose that is really away is seen in the next tick.
+    """
+    if memory.seen_ns is None:
+        return math.inf
+    slept_ns = inputs.now_ns - inputs.deadline_ns + inputs.missed * PERIOD_NS
+    return max(inputs.now_ns - memory.seen_ns - max(slept_ns, 0), 0) * 1e-9
 
 
 def gather(
@@ -100,7 +116,7 @@ def gather(
         scope=scope,
         lateness_s=(inputs.now_ns - inputs.deadline_ns) * 1e-9,
         skipped_share=skipped.bit_count() / SKIPPED_TICKS,
-        pose_gap_s=math.inf if memory.seen_ns is None else (inputs.now_ns - memory.seen_ns) * 1e-9,
+        pose_gap_s=pose_gap_s(inputs, memory),
         pose_rate_hz=inputs.pose.rate_hz,
         rejected=max(inputs.pose.rejected - memory.rejected, 0),
         reject_reason=inputs.pose.reject_reason,
@@ -122,5 +138,7 @@ def _pushed(bits: int, value: bool, count: int, size: int) -> int:
     return ((bits << count) | ((1 << count) - 1) * value) & ((1 << size) - 1)
 
 
-def _is_finite(state: State) -> bool:
-    return all(map(math.isfinite, (*state.p_WB, *state.v_WB_W, *state.q_WB, *state.w_WB_B)))
+def _is_plausible(state: State) -> bool:
+    """Whether numbers can be a vehicle's at all; written so that NaN cannot."""
+    numbers = (*state.p_WB, *state.v_WB_W, *state.w_WB_B)
+    return all(abs(number) < IMPLAUSIBLE for number in numbers) and abs(math.hypot(*state.q_WB) - 1.0) < 0.1

@@ -8,7 +8,7 @@ from flight_bench import START_NS, TICK_NS, healthy, with_link, without_pose
 
 from lcd_flight.model import State, TickInputs
 from lcd_flight.model.frames import IDENTITY
-from lcd_flight.safety.evidence import Evidence, SafetyMemory, Scope, gather, pose_seen
+from lcd_flight.safety.evidence import Evidence, SafetyMemory, Scope, gather, pose_gap_s, pose_seen
 
 STATE = State((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), IDENTITY, (0.0, 0.0, 0.0))
 GOOD = healthy(0, STATE, START_NS)
@@ -26,13 +26,27 @@ def gathered(inputs: TickInputs, memory: SafetyMemory, saturated: bool = False) 
     )
 
 
+def at(inputs: TickInputs, now_ns: int) -> TickInputs:
+    """The same, on time at another time."""
+    return replace(inputs, now_ns=now_ns, deadline_ns=now_ns)
+
+
 def test_the_gap_counts_from_the_arrival_of_the_newest_usable_pose() -> None:
     usable, memory = pose_seen(GOOD, SafetyMemory())
     assert usable
-    later = replace(without_pose(GOOD, 40_000_000), now_ns=GOOD.now_ns + 40_000_000)
+    later = at(without_pose(GOOD, 40_000_000), GOOD.now_ns + 40_000_000)
     usable, memory = pose_seen(later, memory)
     assert not usable
     assert gathered(later, memory)[0].pose_gap_s == pytest.approx(0.043)
+
+
+def test_what_the_loop_slept_through_is_no_gap_but_what_comes_after_is() -> None:
+    _, memory = pose_seen(GOOD, SafetyMemory())
+    woken = GOOD.now_ns + 70_000_000
+    late = replace(without_pose(GOOD, 70_000_000), now_ns=woken, deadline_ns=woken - 4_000_000, missed=5)
+    assert pose_gap_s(late, memory) == pytest.approx(0.019)
+    after = at(without_pose(GOOD, 76_000_000), woken + 6_000_000)
+    assert pose_gap_s(after, memory) == pytest.approx(0.079)
 
 
 def test_before_the_first_pose_the_gap_is_infinite() -> None:
@@ -40,9 +54,9 @@ def test_before_the_first_pose_the_gap_is_infinite() -> None:
     assert gathered(inputs, pose_seen(inputs, SafetyMemory())[1])[0].pose_gap_s == math.inf
 
 
-@pytest.mark.parametrize("broken", [math.nan, math.inf])
+@pytest.mark.parametrize("broken", [math.nan, math.inf, -1e7])
 @pytest.mark.parametrize("field", ["p_WB", "v_WB_W", "w_WB_B", "q_WB"])
-def test_a_pose_that_is_not_finite_is_not_used(field: str, broken: float) -> None:
+def test_a_pose_that_no_vehicle_has_is_not_used(field: str, broken: float) -> None:
     vector = getattr(STATE, field)
     state = replace(STATE, **{field: (broken, *vector[1:])})
     assert not pose_seen(replace(GOOD, pose=replace(GOOD.pose, state=state)), SafetyMemory())[0]

@@ -46,7 +46,7 @@ from lcd_flight.model import (
     Vector3,
     Vehicle,
 )
-from lcd_flight.model.frames import tilt_of
+from lcd_flight.model.frames import IDENTITY, tilt_of
 
 UP = [Phase.PREFLIGHT, Phase.READY, Phase.ARMED, Phase.TAKEOFF, Phase.HOLD, Phase.TRACK]
 TRACKING = 420
@@ -184,6 +184,14 @@ class TestPose:
     def test_a_low_rate_brakes_after_a_second(self) -> None:
         flight = fly(fault=from_tick(TRACKING, lambda i: replace(i, pose=replace(i.pose, rate_hz=80.0))), ticks=600)
         assert first(flight, Phase.BRAKE_HOLD) == TRACKING + 100
+
+
+def fallen(inputs: TickInputs) -> TickInputs:
+    """On the ground after 0.4 s in free fall."""
+    since_s = (inputs.now_ns - START_NS) * 1e-9 - (TRACKING + 3) * 0.01
+    speed = 9.81 * since_s if since_s < 0.41 else 0.0
+    state = State((0.4, 0.4, max(0.8 - 0.5 * 9.81 * since_s**2, 0.0)), (0.0, 0.0, -speed), IDENTITY, (0.0, 0.0, 0.0))
+    return replace(inputs, pose=replace(inputs.pose, state=state))
 
 
 def position(flight: Flight, tick_: int) -> Vector3:
@@ -512,6 +520,22 @@ class TestRoute:
         assert heights[TRACKING] > 0.7
         assert heights[-1] == 0.0
         assert max(np.diff(heights[-200:])) < 0.01
+
+    def test_a_vehicle_that_falls_has_crashed(self) -> None:
+        flight = fly(orders={TRACKING: (Command.LAND,)}, fault=from_tick(TRACKING, fallen))
+        assert phases(flight) == [*UP, Phase.LAND_NOW, Phase.CRASHED]
+        assert finding(flight, "hard_landing")[1].message == "hit the ground at 4.0 m/s"
+
+    def test_a_vehicle_that_lies_on_its_side_has_crashed(self) -> None:
+        def tipped(inputs: TickInputs) -> TickInputs:
+            state = inputs.pose.state
+            assert state is not None
+            turned = replace(state, q_WB=(math.sin(0.45), 0.0, 0.0, math.cos(0.45)))
+            return replace(inputs, pose=replace(inputs.pose, state=turned)) if state.p_WB[2] < 0.01 else inputs
+
+        flight = fly(fault=from_tick(TRACKING, tipped))
+        assert phases(flight) == [*UP, Phase.LAND, Phase.CRASHED]
+        assert "lies_tilted" in codes(flight)
 
     def test_landing_is_pressed_down(self) -> None:
         last = [t for _, t in fly() if t.phase is Phase.LAND][-1]

@@ -94,7 +94,9 @@ def test_small_errors_pass() -> None:
 
 
 def test_one_run_in_twenty_may_exceed_the_limit_but_not_two() -> None:
-    assert told([0.1] * 19 + [1.0]).passed
+    found = told([0.1] * 19 + [1.0])
+    assert found.passed
+    assert (found.p95_error_m, found.max_error_m) == (0.1, 1.0)
     found = told([0.1] * 18 + [1.0, 1.0])
     assert not found.passed
     assert (found.p95_error_m, found.max_error_m) == (1.0, 1.0)
@@ -134,6 +136,7 @@ def test_an_error_that_is_no_number_is_refused() -> None:
     found = told([0.1, float("nan")])
     assert not found.passed
     assert int(found.completed.sum()) == 10
+    assert found.max_error_m == found.p95_error_m == np.inf
 
 
 @pytest.mark.parametrize(
@@ -220,6 +223,7 @@ def test_a_run_is_the_same_whatever_their_number() -> None:
     assert np.array_equal(few.asked[0][2], seeds[:3])
     assert np.array_equal(few.asked[0][3].pose_gap_ticks, gaps[:3])
     assert len(np.unique(seeds)) == 1200
+    assert not np.array_equal(gaps[:512], gaps[512:1024])
 
 
 def test_another_seed_draws_other_runs() -> None:

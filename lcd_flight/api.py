@@ -32,6 +32,8 @@ from lcd_flight.rehearsal.verdict import Rehearsal
 from lcd_flight.review.figures import FlightFigures, figures_of
 from lcd_flight.review.page import write_page
 
+__all__ = ["FlightOptions", "FlownMission", "PreparedFlight", "fly", "plan", "rehearse"]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PreparedFlight:

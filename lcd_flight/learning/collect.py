@@ -26,10 +26,10 @@ from lcd_flight.planning.search import Arena, Generation, SearchSettings, search
 class Mix:
     """What a shard is made of."""
 
-    search_tasks: int = 150
+    search_tasks: int = 180
     """Tasks that are searched in the simulator; every sample of a search is a row."""
-    search_population: int = 32
-    search_generations: int = 12
+    search_population: int = 16
+    search_generations: int = 20
     random_tasks: int = 1984
     """Tasks with their minimum snap and random perturbations of it."""
     random_draws: int = 3

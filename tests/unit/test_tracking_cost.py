@@ -147,13 +147,14 @@ def test_plans_like_those_of_training_are_in_range_and_others_named() -> None:
     assert "segment 3" in reasons[4]
 
 
-def test_the_range_is_a_quarter_wider_than_what_was_seen() -> None:
-    features = np.zeros((1000, 114))
-    features[:, 0] = np.linspace(-1.0, 3.0, 1000)
+def test_the_range_leaves_out_one_in_ten_thousand_at_either_end() -> None:
+    features = np.zeros((100_001, 114))
+    features[:, 0] = np.linspace(-1.0, 3.0, 100_001)
     low, high = training_range(features)
-    assert low[0] == pytest.approx(-2.0, abs=0.02)
-    assert high[0] == pytest.approx(4.0, abs=0.02)
+    assert low[0] == pytest.approx(-1.0 + 4e-4, abs=1e-5)
+    assert high[0] == pytest.approx(3.0 - 4e-4, abs=1e-5)
     assert low[1] < 0.0 < high[1]
+    assert high[1] < 1e-5
 
 
 def test_what_never_varied_in_training_is_out_of_range_as_soon_as_it_does() -> None:

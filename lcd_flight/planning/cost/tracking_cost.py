@@ -31,6 +31,9 @@ _BATCH_WINDOWS = 512
 _STD_FLOOR_SQUARED = 1e-12
 """Below the root of the variance over members, so that its gradient exists where they agree."""
 
+_RANGE_MARGIN = 1e-6
+"""Of the training range, for rounding."""
+
 
 def windows(normalised: Array) -> Array:
     """Each segment between its neighbours: (N, S, F) -> (N, S, 3 F + 2).
@@ -159,8 +162,10 @@ def _aggregate(log_errors: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def training_range(features: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """What counts as trained on, from features (..., F): the 0.1 and 99.9 % quantiles, a quarter of the span wider."""
+    """What counts as trained on, from features (..., F): the 0.01 and 99.99 % quantiles.
+
+    So far out because the tails are where the hard tasks are: near free fall the thrust direction turns at any rate.
+    """
     rows = features.reshape(-1, features.shape[-1])
-    low, high = np.quantile(rows, [0.001, 0.999], axis=0)
-    margin = 0.25 * (high - low) + 1e-6
-    return low - margin, high + margin
+    low, high = np.quantile(rows, [0.0001, 0.9999], axis=0)
+    return low - _RANGE_MARGIN, high + _RANGE_MARGIN

@@ -63,7 +63,8 @@ class Plant:
         if self.crashed:
             return
         self._setpoint = setpoint
-        given = received(setpoint.thrust_N, rotation_of(setpoint.q_WB), self._craft.onboard)
+        R_WB = rotation_of(load4(self._memory, rows.MOTION + 6, 0))
+        given = received(setpoint.thrust_N, rotation_of(setpoint.q_WB), R_WB, self._craft.onboard)
         self._memory[rows.SETPOINT * LANES] = given.thrust
         store3(self._memory, rows.SETPOINT + 1, 0, given.attitude)
 

@@ -238,7 +238,7 @@ def command_attitude(memory: FloatArray, lane: int, law: Law, controller: Onboar
     dt_s = 0.0 if thrust_N > law.thrust_limit_N else TICK_S
     error = (p[0] - ref.p_W[0], p[1] - ref.p_W[1], p[2] - ref.p_W[2])
     store3(memory, rows.INTEGRAL, lane, integrated(integral, error, law.integral_gain, law.integral_limit, dt_s))
-    setpoint = received(thrust_N, R_WD, controller)
+    setpoint = received(thrust_N, R_WD, rotation_of(load4(memory, rows.MOTION + 6, lane)), controller)
     memory[rows.SETPOINT * LANES + lane] = setpoint.thrust
     store3(memory, rows.SETPOINT + 1, lane, setpoint.attitude)
     memory[rows.CLIPS * LANES + lane] = 0.0

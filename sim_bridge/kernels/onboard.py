@@ -146,10 +146,28 @@ def roll_pitch_yaw(R_WB: Rotation) -> Vector3:
     )
 
 
-def received(thrust_N: float, R_WD: Rotation, controller: Onboard) -> Setpoint:
-    """A setpoint as the firmware takes it: thrust in counts within its limits, or none."""
+def tilt_and_heading(R_WD: Rotation, R_WB: Rotation) -> Vector3:
+    """Roll, pitch and yaw setpoint in deg for the attitude R_WD of a vehicle that has R_WB.
+
+    The firmware corrects the three angles apart. Roll and pitch of R_WD itself would point the thrust astray by as much
+    as the heading lags behind; these point it along R_WD's b3 at the heading that the vehicle has.
+    """
+    ahead_x, ahead_y = R_WB[0][0], R_WB[0][1]
+    size = math.sqrt(ahead_x * ahead_x + ahead_y * ahead_y)
+    scale = 1.0 / size if size > 0.0 else 0.0
+    x, y, z = R_WD[2]
+    forward, left = scale * (ahead_x * x + ahead_y * y), scale * (ahead_x * y - ahead_y * x)
+    return (
+        DEGREES * arctan2(-left, math.sqrt(forward * forward + z * z)),
+        DEGREES * arctan2(forward, z),
+        DEGREES * arctan2(R_WD[0][1], R_WD[0][0]),
+    )
+
+
+def received(thrust_N: float, R_WD: Rotation, R_WB: Rotation, controller: Onboard) -> Setpoint:
+    """A setpoint as the firmware is given it: thrust in counts within its limits, or none. R_WB: where it is now."""
     counts = clipped(thrust_N * controller.counts_per_N, 0.0, controller.thrust_limit)
-    return Setpoint(0.0 if counts < SMALLEST_THRUST else counts, roll_pitch_yaw(R_WD))
+    return Setpoint(0.0 if counts < SMALLEST_THRUST else counts, tilt_and_heading(R_WD, R_WB))
 
 
 def wrapped_deg(angle: float) -> float:

@@ -88,7 +88,7 @@ def learned(problem: Problem) -> Planned:
         InputError: the model is missing, damaged, or trained for another vehicle or loop.
     """
     model = load_model(problem.model)
-    check_fits(model, fingerprint(problem.vehicle), problem.world.loop)
+    check_fits(model, fingerprint(problem.vehicle, problem.world.loop), problem.world.loop)
     assert model.card is not None  # noqa: S101 - a loaded model has one
     return _solved(problem, model, PlannerOptions(problem.timing, model.card.snap_weight))
 

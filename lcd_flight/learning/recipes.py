@@ -39,7 +39,7 @@ class TrainConfig:
         """
         if not self.worlds:
             raise InputError("training needs at least one world")
-        kinds = {(vehicle_fingerprint(w.base_vehicle), w.loop, w.sampler.waypoints) for w in self.worlds}
+        kinds = {(vehicle_fingerprint(w.base_vehicle, w.loop), w.loop, w.sampler.waypoints) for w in self.worlds}
         if len(kinds) > 1:
             names = ", ".join(w.name for w in self.worlds)
             raise InputError(f"worlds {names}: not of one vehicle, one loop and one number of waypoints")

@@ -139,7 +139,7 @@ class _Training:
         return ModelCard(
             name=config.name,
             vehicle=first.base_vehicle.name,
-            vehicle_fingerprint=vehicle_fingerprint(first.base_vehicle),
+            vehicle_fingerprint=vehicle_fingerprint(first.base_vehicle, first.loop),
             loop=first.loop,
             worlds=tuple(f"{w.name} v{w.version}" for w in config.worlds),
             parasitic_drag=tuple(first.drag_configurations[d - 1] for d in config.drags),

@@ -82,8 +82,8 @@ def load_cost(mission: Mission, vehicle: Vehicle) -> CostModel:
     """
     name = mission.planner.model or f"{vehicle.name}-flight"
     shipped = name in model_names() or not name.endswith(SUFFIX)
-    model = load_model(name if shipped else mission.file_beside(name))
-    check_fits(model, fingerprint(vehicle), "flight")
+    model = load_model(name if shipped else mission.folder / name)
+    check_fits(model, fingerprint(vehicle, "flight"), "flight")
     return model
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Annotated
 
 from pydantic import Field, field_validator, model_validator
 
-from lcd_flight.model import GeometricGains, InputError, OnboardController, PidGains, Vehicle
+from lcd_flight.model import GeometricGains, InputError, Loop, OnboardController, PidGains, Vehicle
 from lcd_flight.worlds.data_file import Strict, read
 
 _DATA = Path(__file__).parent / "data" / "vehicles"
@@ -130,14 +131,16 @@ def _load(path: Path) -> Vehicle:
     return _vehicle(read(path, VehicleData))
 
 
-def fingerprint(vehicle: Vehicle) -> str:
-    """A short hash of the airframe and its controllers: what a model is trained for.
+_NOT_BINDING: Mapping[Loop, tuple[str, ...]] = {
+    "paper": ("name", "source", "parasitic_drag", "motor_noise", "flight_gains", "onboard"),
+    "flight": ("name", "source", "parasitic_drag", "motor_noise", "gains"),
+}
+"""What a model trained for one vehicle and loop may find different: names, disturbances, and the other loop's law."""
 
-    The name, the sources and what a world varies (drag, motor lag, motor noise) are left out.
-    """
-    figures = asdict(vehicle)
-    for varied in ("name", "source", "parasitic_drag", "motor_time_constant_s", "motor_noise"):
-        del figures[varied]
+
+def fingerprint(vehicle: Vehicle, loop: Loop) -> str:
+    """A short hash of the airframe and of the controllers that fly it in a loop: what a model is trained for."""
+    figures = {key: value for key, value in asdict(vehicle).items() if key not in _NOT_BINDING[loop]}
     return hashlib.sha256(json.dumps(figures, sort_keys=True).encode()).hexdigest()[:16]
 
 

@@ -47,11 +47,10 @@ def vehicle_of(mission: Mission) -> Vehicle:
     Raises:
         InputError: there is no such vehicle or file, or it is wrong.
     """
-    folder = mission.source.path.parent if mission.source.path else Path()
-    vehicle = _load_vehicle(mission.vehicle.type, folder)
+    vehicle = _load_vehicle(mission.vehicle.type, mission.folder)
     if mission.control.gains == "default":
         return vehicle
-    return replace(vehicle, flight_gains=load_gains(folder / mission.control.gains))
+    return replace(vehicle, flight_gains=load_gains(mission.folder / mission.control.gains))
 
 
 def load_gains(path: Path) -> GeometricGains:

@@ -13,7 +13,7 @@ from typing import TypeAlias
 from lcd_flight.mission.actions import Land, Takeoff, Waypoint
 from lcd_flight.mission.draft import Draft
 from lcd_flight.mission.problems import Key
-from lcd_flight.mission.sections import Battery, GeofenceKeys, Planner, Rehearse, Safety, VehicleKeys
+from lcd_flight.mission.sections import Battery, GeofenceKeys, MotionCapture, Planner, Rehearse, Safety, VehicleKeys
 from lcd_flight.model import Vector3
 from lcd_flight.planning.times import SAME_POINT
 
@@ -40,6 +40,17 @@ def battery_order(draft: Draft) -> Found:
         low, high = getattr(battery, f"{lower}_V"), getattr(battery, f"{upper}_V")
         if low >= high:
             yield ("vehicle", "battery", lower), f"{low:g} V is not below {upper} {high:g} V; lower it or raise {upper}"
+
+
+def endpoint_port(draft: Draft) -> Found:
+    """A tcp endpoint has a port."""
+    mocap = draft.part(MotionCapture, "motion_capture")
+    if mocap is None or not mocap.endpoint.startswith("tcp://"):
+        return
+    port = mocap.endpoint.rpartition(":")[2]
+    if not (port.isascii() and port.isdigit() and 1 <= int(port) <= 65_535):
+        found = f"{mocap.endpoint} has no port from 1 to 65535"
+        yield ("motion_capture", "endpoint"), f"{found}; write tcp://HOST:PORT"
 
 
 def fence_order(draft: Draft) -> Found:
@@ -194,6 +205,7 @@ def _up(value: float) -> float:
 
 CHECKS: tuple[Check, ...] = (
     battery_order,
+    endpoint_port,
     fence_order,
     error_order,
     faults_once,

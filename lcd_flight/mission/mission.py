@@ -80,10 +80,10 @@ class Mission(Keys):
         file = "" if self._source.path is None or line is None else f"{self._source.path}:{line}: "
         return f"{file}{dotted(key)}"
 
-    def file_beside(self, name: str) -> Path:
-        """A file that the mission names, relative to the mission's own folder."""
-        folder = self._source.path.parent if self._source.path else Path()
-        return folder / name
+    @property
+    def folder(self) -> Path:
+        """What the files that it names are relative to."""
+        return self._source.path.parent if self._source.path else Path()
 
     def actions(self) -> tuple[Takeoff | Hold | TrajectoryAction | Land, ...]:
         """The items of `plan`, unwrapped."""

@@ -46,8 +46,8 @@ class VehicleKeys(Keys):
 class MotionCapture(Keys):
     """Where poses come from. With sim:// the simulator publishes them there."""
 
-    endpoint: Annotated[str, Field(pattern=r"^(tcp|ipc|loopback)://\S+$", max_length=500)] = "tcp://127.0.0.1:5555"
-    """ZeroMQ endpoint of the pose publisher."""
+    endpoint: Annotated[str, Field(pattern=r"^[a-z][a-z0-9+.-]*://\S+$", max_length=500)] = "tcp://127.0.0.1:5555"
+    """Where poses are published: tcp://HOST:PORT, ipc://PATH, loopback://NAME (within one process)."""
     rigid_body: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+$", max_length=64)] = "cf1"
     """Name of the vehicle's rigid body."""
     frame: Literal["enu", "ned", "y_up"] = "enu"

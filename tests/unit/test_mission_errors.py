@@ -231,6 +231,21 @@ ONE_PROBLEM = {
         "uri: simulator",
         '6: vehicle.uri: "simulator" has the wrong form; write e.g. sim://',
     ),
+    "an endpoint without a port": (
+        "endpoint: tcp://127.0.0.1:5555",
+        "endpoint: tcp://127.0.0.1",
+        "10: motion_capture.endpoint: tcp://127.0.0.1 has no port from 1 to 65535; write tcp://HOST:PORT",
+    ),
+    "a port that cannot be": (
+        "endpoint: tcp://127.0.0.1:5555",
+        "endpoint: tcp://127.0.0.1:99999",
+        "10: motion_capture.endpoint: tcp://127.0.0.1:99999 has no port from 1 to 65535; write tcp://HOST:PORT",
+    ),
+    "an endpoint that is none": (
+        "endpoint: tcp://127.0.0.1:5555",
+        "endpoint: 127.0.0.1",
+        '10: motion_capture.endpoint: "127.0.0.1" has the wrong form; write e.g. tcp://127.0.0.1:5555',
+    ),
     "a name with a slash": (
         "name: right",
         "name: ../right",

@@ -48,6 +48,13 @@ def observe(thread: LogThread, pairs: list[Pair]) -> None:
         thread.observe(inputs, tick)
 
 
+def flying(thread: LogThread, pairs: list[Pair]) -> threading.Thread:
+    """The same in a thread, for what may wait; a daemon, so that a fault fails the test and does not hang it."""
+    flight = threading.Thread(target=observe, args=(thread, pairs), daemon=True)
+    flight.start()
+    return flight
+
+
 def test_everything_is_written_in_order() -> None:
     sink = Sink()
     thread = LogThread(sink)
@@ -74,13 +81,13 @@ def test_a_disk_that_blocks_delays_nothing_and_what_has_no_room_is_counted() -> 
 def test_without_loss_it_waits_for_room() -> None:
     sink = Sink(open_gate=False)
     thread = LogThread(sink, capacity=10, lossless=True)
-    flight = threading.Thread(target=observe, args=(thread, PAIRS))
-    flight.start()
+    flight = flying(thread, PAIRS)
     assert sink.entered.wait(10.0)
     flight.join(0.05)
     assert flight.is_alive()  # the queue is full, and it waits
     sink.gate.set()
     flight.join(10.0)
+    assert not flight.is_alive()
     thread.close()
     assert sink.ticks == PAIRS
     assert thread.statistics == LogStatistics(written=60, dropped=0, error=None)
@@ -141,7 +148,7 @@ def test_closing_twice_is_closing_once() -> None:
 def test_a_real_log_comes_back_whole(tmp_path: Path) -> None:
     path = tmp_path / "flight.mcap"
     thread = LogThread(LogWriter(path, synthetic_flight.header()), capacity=5, lossless=True)
-    observe(thread, PAIRS)
+    flying(thread, PAIRS).join(30.0)
     thread.close()
     assert read_ticks(path) == PAIRS
 

@@ -218,6 +218,15 @@ def test_an_open_log_lacks_at_most_half_a_second(tmp_path: Path, pairs: list[Pai
                 assert number - len(kept) <= 50
 
 
+def test_slow_ticks_reach_the_disk_as_soon(tmp_path: Path, pairs: list[Pair]) -> None:
+    """At 10 Hz a chunk would take seconds to fill: it is flushed by time."""
+    path = tmp_path / "slow.mcap"
+    with closing(LogWriter(path, synthetic_flight.header())) as writer:
+        for inputs, tick in pairs[:200:10]:
+            writer.write(inputs, tick)
+        assert len(read_ticks(path)) >= 15
+
+
 def test_disarming_reaches_the_disk_at_once(tmp_path: Path, pairs: list[Pair], monkeypatch: pytest.MonkeyPatch) -> None:
     synced: list[int] = []
     monkeypatch.setattr(os, "fsync", synced.append)

@@ -17,6 +17,8 @@ PRESS_DEPTH_M = 0.5
 """How far below the ground a landing's reference goes on, so that thrust falls off and the vehicle is seen to stand."""
 RETURN_SPEED = 1.0
 """m/s, peak of the way back to an interrupted leg."""
+HARDEST_DECELERATION = 2.0 * STOPPING_DECELERATION
+"""m/s^2, of a stop for which there is little room above the ground."""
 BLIND_ACCELERATION = 0.5
 """m/s^2 downwards, of the descent without pose."""
 BLIND_MARGIN = 1.5
@@ -26,10 +28,9 @@ _REST_TO_REST = (0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0)
 """Of the unit step in unit time: minimum snap, at rest to jerk at both ends. Its peak speed is 35/16."""
 
 
-def stop(state: State) -> Trajectory:
-    """Straight on, braking at the stopping deceleration; then holds position and heading."""
-    speed = math.hypot(*state.v_WB_W)
-    duration_s = max(speed / STOPPING_DECELERATION, 0.01)
+def stop(state: State, ground_z_m: float) -> Trajectory:
+    """Straight on, braking at the stopping deceleration, harder above near ground; then holds position and heading."""
+    duration_s = _braking_s(state, math.hypot(*state.v_WB_W), ground_z_m)
     segment = _constant_acceleration(state, state.v_WB_W, (0.0, 0.0, 0.0), duration_s)
     return Trajectory(np.array([duration_s]), segment)
 
@@ -37,7 +38,7 @@ def stop(state: State) -> Trajectory:
 def land_from(state: State, ground_z_m: float) -> Trajectory:
     """Straight down from here at `DESCENT_SPEED` once the present velocity is braked, to below the ground."""
     vx, vy, vz = state.v_WB_W
-    duration_s = max(math.hypot(vx, vy, vz + DESCENT_SPEED) / STOPPING_DECELERATION, 0.01)
+    duration_s = _braking_s(state, math.hypot(vx, vy, vz + DESCENT_SPEED), ground_z_m)
     braking = _constant_acceleration(state, state.v_WB_W, (0.0, 0.0, -DESCENT_SPEED), duration_s)
     end = Trajectory(np.array([duration_s]), braking).waypoints()[-1]
     return Trajectory(np.array([duration_s]), braking).then(_sink(end, float(end[2]) - ground_z_m))
@@ -74,6 +75,14 @@ def blind_time_s(height_m: float, climb_speed: float) -> float:
     """
     fall = math.sqrt(climb_speed**2 + 2.0 * BLIND_ACCELERATION * max(height_m, 0.0))
     return BLIND_MARGIN * max(climb_speed + fall, 0.0) / BLIND_ACCELERATION
+
+
+def _braking_s(state: State, change: float, ground_z_m: float) -> float:
+    """Time for a change of velocity in m/s; shorter where the vehicle would meet the ground before."""
+    duration_s, room_m, sinking = change / STOPPING_DECELERATION, state.p_WB[2] - ground_z_m, -state.v_WB_W[2]
+    if sinking > 0.0 and room_m > 0.0:
+        duration_s = min(duration_s, 2.0 * room_m / sinking)
+    return max(duration_s, change / HARDEST_DECELERATION, 0.01)
 
 
 def _constant_acceleration(

@@ -1,7 +1,7 @@
 """The operator: signals and keys become commands. Read once a tick; no thread, nothing to wait for.
 
 Keys: `l` lands, `r` goes on after a brake, space stops the motors. First Ctrl-C lands, second descends level, third
-stops the motors; SIGTERM lands.
+stops the motors; SIGTERM lands, and so does SIGHUP, the terminal that goes away.
 """
 
 from __future__ import annotations
@@ -50,13 +50,14 @@ class Operator:
 
     @contextlib.contextmanager
     def listening(self) -> Iterator[None]:
-        """SIGINT and SIGTERM are commands for as long as this lasts; in another thread than the main one, nothing."""
+        """Signals are commands for as long as this lasts; in another thread than the main one, nothing happens."""
         if threading.current_thread() is not threading.main_thread():
             yield
             return
         before = {
             signal.SIGINT: signal.signal(signal.SIGINT, self._on_interrupt),
             signal.SIGTERM: signal.signal(signal.SIGTERM, self._on_terminate),
+            signal.SIGHUP: signal.signal(signal.SIGHUP, self._on_terminate),
         }
         try:
             yield
@@ -81,7 +82,8 @@ class Operator:
             yield True
         finally:
             self._keys = False
-            termios.tcsetattr(file, termios.TCSADRAIN, before)
+            with contextlib.suppress(termios.error):  # a terminal that has gone needs nothing put back
+                termios.tcsetattr(file, termios.TCSADRAIN, before)
 
     async def agreed(self) -> bool:
         """Whether the next line that is typed says yes; no where there is no terminal."""
@@ -98,11 +100,12 @@ class Operator:
         self._pressed.append(Command.LAND)
 
     def _read_keys(self) -> None:
-        while self._readable():
-            key = os.read(self._terminal.fileno(), 1)
-            if not key:  # the terminal has gone
-                self._keys = False
-                return
+        while self._keys and self._readable():
+            try:
+                key = os.read(self._terminal.fileno(), 1)
+            except OSError:
+                key = b""
+            self._keys = bool(key)  # nothing to read, and yet readable: the terminal has gone
             if key in KEYS:
                 self._pressed.append(KEYS[key])
 

@@ -26,6 +26,8 @@ TOUCHDOWN_THRUST_SHARE = 0.8
 """Of the thrust at which this flight hovers: in the air it would be 0.6 m/s fast after the time above."""
 HARD_LANDING_SPEED = 2.0
 """m/s: a vehicle that came down faster of late has crashed."""
+MOVING_SPEED = 0.3
+"""m/s: a landing is faster than this all the way down."""
 SINK_FADE = 1.5
 """m/s^2, how fast the memory of a high sink speed fades in a vehicle that moves."""
 LYING_RAD = math.radians(45.0)
@@ -56,7 +58,7 @@ def moved_on(memory: Memory, setup: FlightSetup, state: State | None, dt_s: floa
         on_leg=route.on_leg,
         calm_s=route.calm_s + dt_s if still and near else 0.0,
         grounded_s=route.grounded_s + dt_s if still and _is_carried(memory, setup, state) else 0.0,
-        sink_speed=_sink_speed(route, state, 0.0 if still else dt_s),
+        sink_speed=_sink_speed(route, state, dt_s),
         v_smooth_W=v_smooth_W,
     )
     return moved, reference
@@ -108,7 +110,7 @@ def begun(route: Route, setup: FlightSetup, before: Phase, phase: Phase, state: 
     if before in (Phase.ARMED, *ON_THE_WAY) and phase in (Phase.LAND, *ON_THE_WAY):
         return _leg_begun(route, setup)
     if phase is Phase.BRAKE_HOLD:
-        return replace(route, path=stop(state), path_time_s=0.0, on_leg=False)
+        return replace(route, path=stop(state, setup.ground_z_m), path_time_s=0.0, on_leg=False)
     if phase is Phase.LAND_NOW:
         return replace(route, path=land_from(state, setup.lowest_z_m), path_time_s=0.0, on_leg=False)
     if phase is Phase.HOLD:
@@ -143,10 +145,12 @@ def _leg(setup: FlightSetup, index: int) -> Leg | None:
     return setup.plan.legs[index] if 0 <= index < len(setup.plan.legs) else None
 
 
-def _sink_speed(route: Route, state: State | None, moving_s: float) -> float:
+def _sink_speed(route: Route, state: State | None, dt_s: float) -> float:
     """The highest of late; it fades while the vehicle moves, so that one that fell and lies still is known by it."""
-    sinking = 0.0 if state is None else -state.v_WB_W[2]
-    return max(sinking, route.sink_speed - SINK_FADE * moving_s, 0.0)
+    if state is None:
+        return route.sink_speed
+    fade = SINK_FADE * dt_s if math.hypot(*state.v_WB_W) > MOVING_SPEED else 0.0
+    return max(-state.v_WB_W[2], route.sink_speed - fade, 0.0)
 
 
 def _smoothed(v_W: Vector3, state: State | None, dt_s: float) -> Vector3:

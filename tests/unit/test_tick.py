@@ -524,7 +524,7 @@ class TestRoute:
     def test_a_vehicle_that_falls_has_crashed(self) -> None:
         flight = fly(orders={TRACKING: (Command.LAND,)}, fault=from_tick(TRACKING, fallen))
         assert phases(flight) == [*UP, Phase.LAND_NOW, Phase.CRASHED]
-        assert finding(flight, "hard_landing")[1].message == "hit the ground at 4.0 m/s"
+        assert finding(flight, "hard_landing")[1].message == "hit the ground at 3.9 m/s"
 
     def test_a_vehicle_that_lies_on_its_side_has_crashed(self) -> None:
         def tipped(inputs: TickInputs) -> TickInputs:

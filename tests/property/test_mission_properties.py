@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from lcd_flight.mission import Mission, load_mission
 from lcd_flight.mission.assemble import Planned, flight_plan, trajectory_tasks
 from lcd_flight.mission.schema import mission_schema
-from lcd_flight.model import LegKind
+from lcd_flight.model import InputError, LegKind
 from lcd_flight.planning.minimum_snap import minimum_snap
 
 
@@ -111,3 +111,27 @@ def test_the_flight_goes_through_what_the_mission_names(data: dict[str, Any]) ->
     assert flight.legs[0].kind is LegKind.TAKEOFF
     assert flight.legs[-1].kind is LegKind.LAND
     assert flight.duration_s == sum(leg.duration_s for leg in flight.legs)
+
+
+DEMO = (Path(__file__).parents[2] / "missions" / "four_waypoints.yaml").read_text(encoding="utf-8")
+SNIPPETS = st.text(max_size=6) | st.sampled_from(
+    ["- ", ": ", "{", "}", "[", "]", "&a ", "*a", "!!", "\t", "\n", "'", '"', "#", "1e9"]
+)
+
+
+def refusal_of(path: Path) -> str:
+    """What the user sees; empty where the mission loads."""
+    try:
+        load_mission(path)
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(begin=st.integers(0, len(DEMO)), length=st.integers(0, 40), snippet=SNIPPETS)
+def test_a_damaged_file_is_read_or_refused_in_lines(begin: int, length: int, snippet: str, tmp_path: Path) -> None:
+    text = DEMO[:begin] + snippet + DEMO[begin + length :]
+    path = tmp_path / "m.yaml"
+    path.write_bytes(text.encode("utf-8", "surrogatepass"))
+    assert all(line.startswith(f"{path}:") for line in refusal_of(path).splitlines())

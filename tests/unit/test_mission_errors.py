@@ -543,3 +543,25 @@ def test_an_unknown_name_says_what_ships(tmp_path: Path, monkeypatch: pytest.Mon
     with pytest.raises(InputError) as caught:
         load_mission("dmo")
     assert str(caught.value) == "dmo: no such mission; did you mean demo? (only demo), or give a file's path"
+
+
+def test_a_list_is_not_called_short_for_wrong_items(tmp_path: Path) -> None:
+    text = RIGHT.replace("[0.0, 0.0, 1.0]", "[a, 0.0, 1.0]").replace("[1.5, 0.5, 1.2]", "[b, 0.5, 1.2]")
+    assert errors_of(tmp_path, text) == [
+        '20: plan[2].trajectory.waypoints[0].position[0]: "a" is text; write a number in m',
+        '21: plan[2].trajectory.waypoints[1].position[0]: "b" is text; write a number in m',
+    ]
+
+
+def test_keys_are_plain_words(tmp_path: Path) -> None:
+    found = errors_of(tmp_path, RIGHT + "? [1, 2]\n: 3\n&anchor log: {}\n")
+    assert found[0] == "28: a key must be a plain word"
+    assert any(line.startswith("30: ") and "&anchor is an anchor" in line for line in found)
+
+
+def test_what_is_wrong_with_a_vehicle_file_is_told_at_the_missions_key(tmp_path: Path) -> None:
+    (tmp_path / "mine.yaml").write_text("name: mine\n", encoding="utf-8")
+    found = errors_of(tmp_path, RIGHT.replace("type: crazyflie", "type: mine.yaml"))
+    assert len(found) > 1
+    assert all(line.startswith(f"5: vehicle.type: {tmp_path}/mine.yaml: ") for line in found)
+    assert any("mass_kg: this key is missing" in line for line in found)

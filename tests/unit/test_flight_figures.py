@@ -11,7 +11,7 @@ import pytest
 import synthetic_flight
 from synthetic_flight import log_of
 
-from lcd_flight.model import Outcome, Phase
+from lcd_flight.model import FlightPlan, LegKind, Outcome, Phase
 from lcd_flight.review import FlightFigures, figures_of
 
 TRACK_FIRST = 20 + 200 + 100
@@ -40,6 +40,19 @@ def test_errors_off_the_trajectory_count_overall_only() -> None:
     assert figures.max_position_error_m == pytest.approx(0.2)
     assert figures.overall_max_error_m == pytest.approx(0.5)
     assert figures.overall_rmse_m == pytest.approx(math.sqrt((200 * 0.25 + 750 * 0.04) / 950))
+
+
+def test_ways_between_do_not_count_as_the_missions_trajectories() -> None:
+    legs = list(synthetic_flight.plan().legs)
+    legs[1] = replace(legs[1], kind=LegKind.TRANSFER)
+    pairs = [
+        (i, replace(t, phase=Phase.TRACK, position_error_W=(0.9, 0.0, 0.0)) if t.leg == 1 else t)
+        for i, t in synthetic_flight.flight()
+    ]
+    figures = figures_of(log_of(pairs, plan=FlightPlan(tuple(legs))))
+    assert figures.max_position_error_m == pytest.approx(0.1)
+    assert figures.overall_max_error_m == pytest.approx(0.9)
+    assert [row.name for row in figures.phases][3:5] == ["transfer", "trajectory"]
 
 
 def test_waypoints_are_measured_at_their_planned_instants() -> None:

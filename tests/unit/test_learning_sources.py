@@ -1,0 +1,99 @@
+"""Training plans and targets: pure functions of (seed, index), over the range they claim."""
+
+import numpy as np
+import pytest
+
+from lcd_flight.learning import sources
+from lcd_flight.learning.rebuild import trajectories, variables
+from lcd_flight.learning.rollouts import Plans, Source
+from lcd_flight.learning.sources import optima, random_plans, training_tasks
+from lcd_flight.learning.targets import targets
+from lcd_flight.model import RolloutLabels
+from lcd_flight.planning.minimum_snap import minimum_snap_batch, snap
+from lcd_flight.planning.times import shortest_yaw
+from lcd_flight.worlds import load_world
+
+WORLD = load_world("crazyflie-saturated")
+TASKS = np.arange(4_000)
+
+
+def test_a_random_plan_depends_on_seed_task_and_draw_alone():
+    whole = random_plans(3, np.repeat(TASKS[:50], 4), np.tile(np.arange(4), 50), 3)
+    one = random_plans(3, np.array([17]), np.array([2]), 3)
+    row = 17 * 4 + 2
+    assert np.array_equal(one.z[0], whole.z[row])
+    assert np.array_equal(one.theta[0], whole.theta[row])
+    assert len(np.unique(whole.z[:, 0])) == 200
+    assert not np.array_equal(random_plans(4, np.array([17]), np.array([2]), 3).z, one.z)
+
+
+def test_random_plans_span_the_range_of_relative_snap():
+    plans = random_plans(0, TASKS, np.zeros_like(TASKS), 3)
+    z = plans.z.reshape(-1, 2, 3, 4)
+    for axes in (slice(0, 3), slice(3, 4)):
+        length = np.log(np.linalg.norm(z[..., axes].reshape(len(z), -1), axis=1))
+        low, high = np.log(sources.RELATIVE_SNAP_ROOT)
+        share, _ = np.histogram(length, 5, (low - 1e-6, high + 1e-6))
+        assert np.allclose(share / len(TASKS), 0.2, atol=0.025)
+    retimed = np.any(plans.theta != 0.0, axis=1)
+    assert retimed.mean() == pytest.approx(sources.RETIMED_SHARE, abs=0.03)
+    assert set(plans.source) == {Source.RANDOM}
+
+
+def test_stored_plans_are_rebuilt_with_their_relative_snap():
+    """At the paper's times |z|^2 over the position axes is the extra snap over the least one."""
+    plans = random_plans(0, TASKS[:40], np.zeros(40, np.int64), 3)
+    still = Plans(plans.task, plans.source, plans.z, np.zeros_like(plans.theta))
+    space = variables(WORLD, 0, still)
+    least, flown = snap(space.minimum)[:, :3].sum(axis=1), snap(trajectories(WORLD, 0, still))[:, :3].sum(axis=1)
+    size = (still.z.reshape(-1, 2, 3, 4)[..., :3].astype(float) ** 2).sum(axis=(1, 2, 3))
+    assert np.allclose(flown / least - 1.0, size, rtol=1e-6)
+
+
+def test_optima_are_minimum_snap():
+    tasks = training_tasks(WORLD.sampler, 0, TASKS[:10])
+    wanted = minimum_snap_batch(tasks.poses, tasks.durations_s(WORLD.speed))
+    assert np.allclose(trajectories(WORLD, 0, optima(TASKS[:10], 3)).coefficients, wanted.coefficients, atol=1e-9)
+
+
+def test_rebuilding_does_not_depend_on_the_other_rows():
+    plans = random_plans(0, np.array([5, 5, 9, 2]), np.array([0, 1, 0, 0]), 3)
+    alone = trajectories(WORLD, 0, plans.take(np.array([2])))
+    assert np.array_equal(trajectories(WORLD, 0, plans).coefficients[2], alone.coefficients[0])
+
+
+def test_half_of_the_training_tasks_turn_by_the_short_way():
+    tasks = training_tasks(WORLD.sampler, 1, TASKS)
+    short = np.all(tasks.yaws_rad == shortest_yaw(tasks.yaws_rad), axis=1)
+    turns = np.abs(np.diff(tasks.yaws_rad, axis=1)).max(axis=1)
+    assert turns.max() > 1.5 * np.pi
+    assert short.mean() == pytest.approx(0.8, abs=0.03)  # three in five tasks have no long way to turn by
+
+
+def labels(segments, yaw_cost=0.0):
+    segments = np.array(segments, dtype=float)
+    n = len(segments)
+    zero = np.zeros(n)
+    worst = np.nanmax(segments, axis=1)
+    return RolloutLabels(
+        worst, zero, zero, zero, zero, segments, np.zeros((n, 4)), zero + yaw_cost, zero, zero, zero, zero, zero == 0.0
+    )
+
+
+def test_targets_by_hand():
+    found = targets(labels([[0.1, 0.2, 0.4], [1e-6, 0.5, 9.0]], yaw_cost=0.0))
+    assert np.allclose(np.exp(found.segment), [[0.1, 0.2, 0.4], [0.01, 0.5, 5.0]])
+    assert np.allclose(np.exp(found.rollout), [0.4, 5.0])
+    assert found.kept.all()
+    assert np.allclose(np.exp(targets(labels([[0.3]], yaw_cost=1.6)).segment), 0.5)
+
+
+def test_what_follows_a_lost_segment_is_left_out():
+    found = targets(labels([[0.1, 2.5, 0.3], [2.5, 0.3, 0.3], [1.9, 1.9, 3.0], [0.1, 3.0, np.nan]]))
+    assert found.kept.tolist() == [
+        [True, True, False],
+        [True, False, False],
+        [True, True, True],
+        [True, True, False],
+    ]
+    assert np.isfinite(found.segment).all()

@@ -3,8 +3,9 @@
     min over z, theta of   weight * cost(plan) + lambda |z|^2 + lambda / 2 |theta|^2,   plan = Whitening.plan(z, theta)
 
 This is the paper's problem 3 in variables that satisfy its constraints whatever they are, with its c'Hc counted
-relative to the least snap there is: |z|^2. Each row is solved on its own by Adam from minimum snap (zeros), keeps its
-best iterate, and falls back to minimum snap, saying why, where that did not lead to a better plan.
+relative to the least snap there is: |z|^2. Each row is solved by Adam from minimum snap (zeros), keeps its best
+iterate, and falls back to minimum snap, saying why, where that did not lead to a better plan. A row's plan depends on
+that row alone, to the bit.
 """
 
 from __future__ import annotations
@@ -197,7 +198,7 @@ class PlanObjective:
         grad_z, grad_theta = self._whitening.pullback(z, theta, grad_durations, grad_coefficients)
         weights = np.full(self.size, self._options.snap_weight)
         weights[self._z_size :] *= 0.5
-        value = self._options.cost_weight * cost + (variables**2) @ weights
+        value = self._options.cost_weight * cost + (variables**2 * weights).sum(axis=1)
         grad = np.concatenate([grad_z.reshape(len(variables), self._z_size), grad_theta], axis=1)
         grad = self._options.cost_weight * grad + 2.0 * weights * variables
         if self._options.timing == "fixed":

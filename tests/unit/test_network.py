@@ -24,7 +24,7 @@ def pair(sizes: list[int], members: int, activation: Activation) -> tuple[Networ
 
 
 @pytest.mark.parametrize("activation", ACTIVATIONS)
-@pytest.mark.parametrize("sizes", [[5, 1], [7, 4, 1], [20, 16, 8, 4, 1]])
+@pytest.mark.parametrize("sizes", [[5, 1], [7, 4, 1], [20, 16, 8, 4, 1], [9, 300, 130, 1]])
 @pytest.mark.parametrize("members", [1, 3])
 def test_outputs_and_gradients_agree_with_torch(sizes: list[int], members: int, activation: Activation) -> None:
     network, peers = pair(sizes, members, activation)
@@ -77,3 +77,22 @@ def test_a_backward_pass_may_be_repeated() -> None:
     weights = np.ones((2, 4))
     assert np.array_equal(network.backward(tape, weights), network.backward(tape, weights))
     assert np.all(weights == 1.0)
+
+
+def test_a_row_gives_the_same_bits_alone_and_among_others() -> None:
+    network, _ = pair([344, 128, 128, 32, 1], 2, "silu")
+    single = network.astype(np.float32)
+    inputs = np.random.default_rng(4).normal(size=(11, 344))
+    outputs, tape = single.forward(inputs)
+    grad = single.backward(tape, np.ones((2, 11)))
+    for n in range(11):
+        alone, alone_tape = single.forward(inputs[n : n + 1])
+        assert np.array_equal(alone[:, 0], outputs[:, n])
+        assert np.array_equal(single.backward(alone_tape, np.ones((2, 1)))[0], grad[n])
+
+
+def test_no_rows_are_no_trouble() -> None:
+    network, _ = pair([6, 5, 1], 2, "silu")
+    outputs, tape = network.forward(np.zeros((0, 6)))
+    assert outputs.shape == (2, 0)
+    assert network.backward(tape, outputs).shape == (0, 6)

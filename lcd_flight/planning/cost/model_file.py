@@ -63,7 +63,7 @@ def save_model(path: Path, model: CostModel, card: ModelCard, test_plans: Trajec
     value, _, _ = model.value_and_gradient(test_plans.durations_s, test_plans.coefficients)
     tensors: Tensors = {name: getattr(model, name) for name in _RANGES}
     for i, layer in enumerate(model.network.layers):
-        tensors |= {f"layer{i}.weights": layer.weights, f"layer{i}.biases": layer.biases[:, 0, :]}
+        tensors |= {f"layer{i}.weights": layer.weights, f"layer{i}.biases": layer.biases}
     tensors |= {"test.durations_s": test_plans.durations_s, "test.coefficients": test_plans.coefficients}
     tensors = {name: np.ascontiguousarray(t) for name, t in sorted((tensors | {"test.value": value}).items())}
     _check_finite(path, tensors)

@@ -1,17 +1,22 @@
-"""An ensemble of small fully connected networks, forward and backward: matrix products and nothing else.
+"""An ensemble of small fully connected networks, forward and backward.
 
 The members are stacked, so that one call serves all of them. The arithmetic is that of the weights: float32 for
-planning, float64 where a test wants the last digit.
+planning, float64 where a test wants the last digit. A row's outputs depend on that row alone, to the bit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+
+from lcd_flight.jit import Compiler
+from lcd_flight.planning.cost import network_kernel
 
 Activation: TypeAlias = Literal["silu", "elu", "relu"]
 ACTIVATIONS: tuple[Activation, ...] = get_args(Activation)
@@ -22,11 +27,18 @@ Array: TypeAlias = NDArray[np.floating[Any]]
 class Layer:
     """One layer of every member.
 
-    weights: (M, inputs, outputs); biases: (M, 1, outputs).
+    weights: (M, inputs, outputs); transposed: (M, outputs, inputs), for the way back; biases: (M, outputs).
     """
 
     weights: Array
+    transposed: Array
     biases: Array
+
+    @staticmethod
+    def of(weights: Array, biases: Array) -> Layer:
+        """From weights (M, inputs, outputs) and biases (M, outputs) of one precision."""
+        transposed = np.ascontiguousarray(weights.transpose(0, 2, 1))
+        return Layer(np.ascontiguousarray(weights), transposed, np.ascontiguousarray(biases))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,8 +59,7 @@ class Network:
     @staticmethod
     def of(weights: Sequence[Array], biases: Sequence[Array], activation: Activation) -> Network:
         """From weights (M, inputs, outputs) and biases (M, outputs), input layer first; the last has one output."""
-        layers = [Layer(np.ascontiguousarray(w), b[:, None, :]) for w, b in zip(weights, biases, strict=True)]
-        return Network(tuple(layers), activation)
+        return Network(tuple(Layer.of(w, b) for w, b in zip(weights, biases, strict=True)), activation)
 
     @property
     def members(self) -> int:
@@ -67,31 +78,38 @@ class Network:
 
     def astype(self, dtype: type[np.floating[Any]]) -> Network:
         """The same networks in another precision."""
-        layers = [Layer(layer.weights.astype(dtype), layer.biases.astype(dtype)) for layer in self.layers]
+        layers = (Layer.of(layer.weights.astype(dtype), layer.biases.astype(dtype)) for layer in self.layers)
         return Network(tuple(layers), self.activation)
 
     def forward(self, inputs: Array) -> tuple[Array, Tape]:
         """Outputs (M, B) for inputs (B, inputs), and what `backward` needs."""
-        x = np.asarray(inputs, dtype=self.dtype)
+        x = np.ascontiguousarray(inputs, dtype=self.dtype)[None]
         slopes = []
         for layer in self.layers[:-1]:
-            x, slope = activate(_affine(x, layer), self.activation)
+            x, slope = activate(_affine(x, layer.weights, layer.biases), self.activation)
             slopes.append(slope)
-        return _affine(x, self.layers[-1])[..., 0], Tape(tuple(slopes))
+        return _affine(x, self.layers[-1].weights, self.layers[-1].biases)[..., 0], Tape(tuple(slopes))
 
     def backward(self, tape: Tape, grad_outputs: Array) -> Array:
         """From a function's gradient by the outputs (M, B) to its gradient by the inputs (B, inputs)."""
-        grad = np.asarray(grad_outputs, dtype=self.dtype)[..., None] * self.layers[-1].weights[:, None, :, 0]
+        grad = np.asarray(grad_outputs, dtype=self.dtype)[..., None] * self.layers[-1].transposed
         for layer, slope in zip(reversed(self.layers[:-1]), reversed(tape.slopes), strict=True):
             grad *= slope
-            grad = grad @ layer.weights.transpose(0, 2, 1)
+            grad = _affine(grad, layer.transposed, np.zeros(layer.weights.shape[:2], self.dtype))
         return np.asarray(grad.sum(axis=0))
 
 
-def _affine(x: Array, layer: Layer) -> Array:
-    y = x @ layer.weights
-    y += layer.biases
-    return y
+def _affine(x: Array, weights: Array, biases: Array) -> Array:
+    """x (M or 1, B, inputs) @ weights + biases: (M, B, outputs)."""
+    out = np.empty((len(weights), x.shape[1], weights.shape[2]), weights.dtype)
+    _kernel()(x, weights, biases, out)
+    return out
+
+
+@cache
+def _kernel() -> Callable[[Array, Array, Array, Array], None]:
+    compiler = Compiler(Path(network_kernel.__file__), nogil=True, error_model="numpy", fastmath={"contract"})
+    return compiler.kernel(network_kernel.affine)
 
 
 def activate(x: Array, activation: Activation) -> tuple[Array, Array]:

@@ -27,14 +27,18 @@ TOUCHDOWN_THRUST_SHARE = 0.8
 HARD_LANDING_SPEED = 2.0
 """m/s: a vehicle that came down faster of late has crashed."""
 MOVING_SPEED = 0.3
-"""m/s: a landing is faster than this all the way down."""
+"""m/s: what lies on the ground is slower."""
 SINK_FADE = 1.5
-"""m/s^2, how fast the memory of a high sink speed fades in a vehicle that moves."""
+"""m/s^2, how fast the memory of a high sink speed fades in the air."""
 LYING_RAD = math.radians(45.0)
 """A vehicle at rest that is tilted more has crashed."""
-BLIND_TOUCHDOWN_M = 0.1
-"""Height above the ground below which a vehicle that stands has landed, where thrust is constant and tells nothing."""
+NEAR_GROUND_M = 0.1
+"""Height above the ground below which a vehicle that stands still stands on it."""
+STUCK_BELOW_M = 0.2
+"""Below its reference: so far a vehicle that stands on the ground should have flown."""
+STUCK_S = 0.2
 
+FALLEN = "fallen"
 HARD_LANDING = "hard_landing"
 LYING = "lies_tilted"
 
@@ -58,7 +62,8 @@ def moved_on(memory: Memory, setup: FlightSetup, state: State | None, dt_s: floa
         on_leg=route.on_leg,
         calm_s=route.calm_s + dt_s if still and near else 0.0,
         grounded_s=route.grounded_s + dt_s if still and _is_carried(memory, setup, state) else 0.0,
-        sink_speed=_sink_speed(route, state, dt_s),
+        stuck_s=route.stuck_s + dt_s if still and _is_left_behind(setup, state, reference) else 0.0,
+        sink_speed=_sink_speed(route, setup, state, dt_s),
         v_smooth_W=v_smooth_W,
     )
     return moved, reference
@@ -69,8 +74,15 @@ def _is_carried(memory: Memory, setup: FlightSetup, state: State | None) -> bool
     if memory.setpoint is None or state is None:
         return False
     if memory.phase is Phase.DESCEND_BLIND:
-        return state.p_WB[2] - setup.ground_z_m < BLIND_TOUCHDOWN_M
+        return _is_near_ground(setup, state)
     return memory.setpoint.thrust_N < TOUCHDOWN_THRUST_SHARE * (memory.hover_N or setup.vehicle.weight_N)
+
+
+def _is_left_behind(setup: FlightSetup, state: State | None, reference: Reference | None) -> bool:
+    """Whether a vehicle that stands still stands on the ground, well below where it should be."""
+    if state is None or reference is None or not _is_near_ground(setup, state):
+        return False
+    return reference.p_W[2] - state.p_WB[2] > STUCK_BELOW_M
 
 
 def next_leg(route: Route, setup: FlightSetup, phase: Phase) -> tuple[Event | None, tuple[Finding, ...]]:
@@ -91,22 +103,33 @@ def next_leg(route: Route, setup: FlightSetup, phase: Phase) -> tuple[Event | No
 
 
 def ground_contact(route: Route, phase: Phase, state: State | None) -> tuple[Event | None, tuple[Finding, ...]]:
-    """Touchdown of a vehicle that is to land and stands; a crash where it fell there, or lies on its side."""
-    if phase not in GOING_DOWN or route.grounded_s < TOUCHDOWN_S or state is None:
+    """What a vehicle that stands means: touchdown where it was to land, else that it fell or never lifted off."""
+    if state is None or not phase.airborne:
         return None, ()
+    if route.stuck_s >= STUCK_S:
+        if phase is Phase.TAKEOFF:
+            return Event.LAND, (Finding("no_lift_off", Severity.LAND, "does not lift off"),)
+        return Event.CRASHED, (Finding(FALLEN, Severity.KILL, "is on the ground although it should fly"),)
+    if phase in GOING_DOWN and route.grounded_s >= TOUCHDOWN_S:
+        damage = _damage(route, state)
+        return Event.CRASHED if damage else Event.TOUCHDOWN, damage
+    return None, ()
+
+
+def _damage(route: Route, state: State) -> tuple[Finding, ...]:
+    """Why a vehicle that stands has not landed but crashed; nothing where it has landed."""
     tilt_rad = tilt_of(state.q_WB)
     if route.sink_speed > HARD_LANDING_SPEED:
         text = f"hit the ground at {route.sink_speed:.1f} m/s"
-        return Event.CRASHED, (Finding(HARD_LANDING, Severity.KILL, text, route.sink_speed, HARD_LANDING_SPEED),)
+        return (Finding(HARD_LANDING, Severity.KILL, text, route.sink_speed, HARD_LANDING_SPEED),)
     if tilt_rad > LYING_RAD:
         text = f"lies on the ground, tilted by {math.degrees(tilt_rad):.0f} deg"
-        return Event.CRASHED, (Finding(LYING, Severity.KILL, text, tilt_rad, LYING_RAD),)
-    return Event.TOUCHDOWN, ()
+        return (Finding(LYING, Severity.KILL, text, tilt_rad, LYING_RAD),)
+    return ()
 
 
 def begun(route: Route, setup: FlightSetup, before: Phase, phase: Phase, state: State) -> Route:
     """The route as a phase is entered, or as the next leg begins; call it only then."""
-    route = replace(route, sink_speed=0.0)
     if before in (Phase.ARMED, *ON_THE_WAY) and phase in (Phase.LAND, *ON_THE_WAY):
         return _leg_begun(route, setup)
     if phase is Phase.BRAKE_HOLD:
@@ -145,12 +168,16 @@ def _leg(setup: FlightSetup, index: int) -> Leg | None:
     return setup.plan.legs[index] if 0 <= index < len(setup.plan.legs) else None
 
 
-def _sink_speed(route: Route, state: State | None, dt_s: float) -> float:
-    """The highest of late; it fades while the vehicle moves, so that one that fell and lies still is known by it."""
+def _sink_speed(route: Route, setup: FlightSetup, state: State | None, dt_s: float) -> float:
+    """The highest of late; it does not fade in a vehicle that lies on the ground, so that a fall is remembered."""
     if state is None:
         return route.sink_speed
-    fade = SINK_FADE * dt_s if math.hypot(*state.v_WB_W) > MOVING_SPEED else 0.0
-    return max(-state.v_WB_W[2], route.sink_speed - fade, 0.0)
+    lies = _is_near_ground(setup, state) and math.hypot(*state.v_WB_W) < MOVING_SPEED
+    return max(-state.v_WB_W[2], route.sink_speed - (0.0 if lies else SINK_FADE * dt_s), 0.0)
+
+
+def _is_near_ground(setup: FlightSetup, state: State) -> bool:
+    return state.p_WB[2] - setup.ground_z_m < NEAR_GROUND_M
 
 
 def _smoothed(v_W: Vector3, state: State | None, dt_s: float) -> Vector3:

@@ -86,6 +86,8 @@ class Route:
     """For how long the vehicle has stood still at the reference."""
     grounded_s: float = 0.0
     """For how long it has stood still although its thrust does not carry it."""
+    stuck_s: float = 0.0
+    """For how long it has stood on the ground although its reference is well above."""
     sink_speed: float = 0.0
     """m/s downwards, the highest of late."""
     v_smooth_W: Vector3 = (0.0, 0.0, 0.0)

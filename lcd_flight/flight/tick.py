@@ -11,7 +11,7 @@ import math
 from lcd_flight.flight.estimate import estimate, hover_thrust_N
 from lcd_flight.flight.manoeuvres import blind_time_s
 from lcd_flight.flight.phases import OF_COMMAND, OF_SEVERITY, TIME_LIMITS_S, Event, advance
-from lcd_flight.flight.route import HARD_LANDING, LYING, begun, ground_contact, moved_on, next_leg
+from lcd_flight.flight.route import FALLEN, HARD_LANDING, LYING, begun, ground_contact, moved_on, next_leg
 from lcd_flight.flight.setup import FlightSetup, Memory, Route
 from lcd_flight.flight.steering import Steering, saturated, steer
 from lcd_flight.model import (
@@ -37,6 +37,7 @@ EXPIRED = "phase_expired"
 _OF_CODE = {
     EXPIRED: Event.EXPIRED,
     VEHICLE_CRASHED: Event.CRASHED,
+    FALLEN: Event.CRASHED,
     HARD_LANDING: Event.CRASHED,
     LYING: Event.CRASHED,
 }

@@ -526,6 +526,20 @@ class TestRoute:
         assert phases(flight) == [*UP, Phase.LAND_NOW, Phase.CRASHED]
         assert finding(flight, "hard_landing")[1].message == "hit the ground at 3.9 m/s"
 
+    def test_a_vehicle_that_is_on_the_ground_unseen_has_fallen(self) -> None:
+        """The pose is away while it falls: the landing goes on from where it is believed to be."""
+        lost, down = gap(TRACKING, 28), from_tick(TRACKING + 28, fallen)
+        flight = fly(fault=lambda k, i: down(k, lost(k, i)))
+        assert phases(flight) == [*UP, Phase.BRAKE_HOLD, Phase.CRASHED]
+        assert codes(flight) >= {"fallen"}
+
+    def test_a_vehicle_that_does_not_lift_off_is_stopped(self) -> None:
+        still = State((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), IDENTITY, (0.0, 0.0, 0.0))
+        flight = fly(fault=lambda _, i: replace(i, pose=replace(i.pose, state=still)))
+        assert phases(flight) == [*UP[:4], Phase.LAND_NOW, Phase.LANDED]
+        assert first(flight, Phase.LAND_NOW) < 100
+        assert "no_lift_off" in codes(flight)
+
     def test_a_vehicle_that_lies_on_its_side_has_crashed(self) -> None:
         def tipped(inputs: TickInputs) -> TickInputs:
             state = inputs.pose.state

@@ -186,12 +186,17 @@ class TestPose:
         assert first(flight, Phase.BRAKE_HOLD) == TRACKING + 100
 
 
-def fallen(inputs: TickInputs) -> TickInputs:
-    """On the ground after 0.4 s in free fall."""
-    since_s = (inputs.now_ns - START_NS) * 1e-9 - (TRACKING + 3) * 0.01
-    speed = 9.81 * since_s if since_s < 0.41 else 0.0
-    state = State((0.4, 0.4, max(0.8 - 0.5 * 9.81 * since_s**2, 0.0)), (0.0, 0.0, -speed), IDENTITY, (0.0, 0.0, 0.0))
-    return replace(inputs, pose=replace(inputs.pose, state=state))
+def fallen(start: int) -> Callable[[TickInputs], TickInputs]:
+    """Free fall from 0.8 m, from that tick on."""
+
+    def fall(inputs: TickInputs) -> TickInputs:
+        since_s = (inputs.now_ns - START_NS) * 1e-9 - (start + 3) * 0.01
+        speed = 9.81 * since_s if since_s < 0.41 else 0.0
+        z_m = max(0.8 - 0.5 * 9.81 * since_s**2, 0.0)
+        state = State((0.4, 0.4, z_m), (0.0, 0.0, -speed), IDENTITY, (0.0, 0.0, 0.0))
+        return replace(inputs, pose=replace(inputs.pose, state=state))
+
+    return fall
 
 
 def position(flight: Flight, tick_: int) -> Vector3:
@@ -522,13 +527,18 @@ class TestRoute:
         assert max(np.diff(heights[-200:])) < 0.01
 
     def test_a_vehicle_that_falls_has_crashed(self) -> None:
-        flight = fly(orders={TRACKING: (Command.LAND,)}, fault=from_tick(TRACKING, fallen))
+        flight = fly(orders={TRACKING: (Command.LAND,)}, fault=from_tick(TRACKING, fallen(TRACKING)))
+        assert phases(flight) == [*UP, Phase.LAND_NOW, Phase.CRASHED]
+        assert finding(flight, "fallen")[1].message == "is on the ground although it should fly"
+
+    def test_a_vehicle_that_falls_at_the_end_of_its_landing_has_crashed(self) -> None:
+        flight = fly(orders={TRACKING: (Command.LAND,)}, fault=from_tick(TRACKING + 215, fallen(TRACKING + 215)))
         assert phases(flight) == [*UP, Phase.LAND_NOW, Phase.CRASHED]
         assert finding(flight, "hard_landing")[1].message == "hit the ground at 3.9 m/s"
 
     def test_a_vehicle_that_is_on_the_ground_unseen_has_fallen(self) -> None:
         """The pose is away while it falls: the landing goes on from where it is believed to be."""
-        lost, down = gap(TRACKING, 28), from_tick(TRACKING + 28, fallen)
+        lost, down = gap(TRACKING, 28), from_tick(TRACKING + 28, fallen(TRACKING))
         flight = fly(fault=lambda k, i: down(k, lost(k, i)))
         assert phases(flight) == [*UP, Phase.BRAKE_HOLD, Phase.CRASHED]
         assert codes(flight) >= {"fallen"}

@@ -11,8 +11,8 @@ import numpy as np
 
 from lcd_flight.model import BoolArray, FloatArray, IntArray
 
-Objective: TypeAlias = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
-"""From variables (N, V) to values (N,) and gradients (N, V), each row's from that row alone."""
+Objective: TypeAlias = Callable[[FloatArray], tuple[FloatArray, FloatArray, BoolArray]]
+"""From variables (N, V) to values (N,), gradients (N, V) and where the value can be trusted (N,); row by row."""
 
 _DECAY_MEAN, _DECAY_SQUARE, _ROOT_FLOOR = 0.9, 0.999, 1e-8
 """Adam's constants (Kingma and Ba 2015, algorithm 1)."""
@@ -23,11 +23,15 @@ class Descent:
     """Where N descents got to."""
 
     best: FloatArray
-    """(N, V) the variables of least value among the iterates."""
+    """(N, V) the start, or the iterate of least value below the start's among those whose value can be trusted."""
     best_iteration: IntArray
     """(N,) which iterate that was; 0 is the start."""
     failed: BoolArray
     """(N,) a value or a gradient was not finite; the row stopped there."""
+    mistrusted: BoolArray
+    """(N,) an iterate of a lower value was passed over, since it could not be trusted."""
+    last: FloatArray
+    """(N, V) the last iterate."""
 
 
 def descend(objective: Objective, start: FloatArray, iterations: int, step: float) -> Descent:
@@ -35,19 +39,19 @@ def descend(objective: Objective, start: FloatArray, iterations: int, step: floa
     x, best = start.copy(), start.copy()
     mean, square = np.zeros_like(x), np.zeros_like(x)
     best_value = np.full(len(x), np.inf)
-    best_iteration, failed = np.zeros(len(x), dtype=np.int64), np.zeros(len(x), dtype=bool)
+    best_iteration = np.zeros(len(x), dtype=np.int64)
+    failed, mistrusted = np.zeros(len(x), dtype=bool), np.zeros(len(x), dtype=bool)
     for k in range(iterations + 1):
-        value, grad = objective(x)
+        value, grad, trusted = objective(x)
         failed |= ~(np.isfinite(value) & np.isfinite(grad).all(axis=1))
-        better = ~failed & (value < best_value)
+        lower = ~failed & (value < best_value)
+        better = lower & (trusted | (k == 0))
+        mistrusted |= lower & ~better
         best[better], best_value[better], best_iteration[better] = x[better], value[better], k
         grad[failed] = 0.0
         mean += (1.0 - _DECAY_MEAN) * (grad - mean)
         square += (1.0 - _DECAY_SQUARE) * (grad * grad - square)
-        unbiased_mean, unbiased_square = (
-            mean / (1.0 - _DECAY_MEAN ** (k + 1)),
-            square / (1.0 - _DECAY_SQUARE ** (k + 1)),
-        )
-        rate = 0.5 * step * (1.0 + math.cos(math.pi * k / iterations))
-        x -= rate * unbiased_mean / (np.sqrt(unbiased_square) + _ROOT_FLOOR)
-    return Descent(best, best_iteration, failed)
+        direction = mean / (1.0 - _DECAY_MEAN ** (k + 1))
+        size = np.sqrt(square / (1.0 - _DECAY_SQUARE ** (k + 1))) + _ROOT_FLOOR
+        x -= 0.5 * step * (1.0 + math.cos(math.pi * k / iterations)) * direction / size  # the last one is 0
+    return Descent(best, best_iteration, failed, mistrusted, last=x)

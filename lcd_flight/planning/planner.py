@@ -48,8 +48,12 @@ class ErrorPredictor(TrackingCost, Protocol):
         """(N,) largest position error of each plan."""
         ...
 
+    def in_range(self, durations_s: FloatArray, coefficients: FloatArray) -> BoolArray:
+        """(N,) whether the predictions are good for each plan."""
+        ...
+
     def out_of_range(self, durations_s: FloatArray, coefficients: FloatArray) -> tuple[str | None, ...]:
-        """For each plan None, or how it differs from what the prediction is good for."""
+        """For each plan None, or why it is not in range."""
         ...
 
 
@@ -154,9 +158,11 @@ def _plan(whitening: Whitening, cost: TrackingCost, options: PlannerOptions) -> 
     z, theta = objective.unpack(descent.best)
     found, minimum = whitening.plan(z, theta), whitening.minimum
     before, after = _Judgement.of(cost, minimum), _Judgement.of(cost, found)
+    strange = _strangeness(cost, whitening.plan(*objective.unpack(descent.last)))
+    verdicts = zip(descent.failed, after.below(before), descent.mistrusted, strange, strict=True)
     reasons = tuple(
-        _why_not(segments=whitening.durations_s.shape[1], failed=failed, improved=improved, strange=strange)
-        for failed, improved, strange in zip(descent.failed, after.below(before), after.out_of_range, strict=True)
+        _why_not(segments=found.segments, failed=failed, improved=improved, mistrusted=mistrusted, strange=why)
+        for failed, improved, mistrusted, why in verdicts
     )
     kept = np.array([reason is None for reason in reasons])
     plans = Trajectories(
@@ -190,8 +196,8 @@ class PlanObjective:
         """z (N, S - 1, 3, 4) and theta (N, S)."""
         return variables[:, : self._z_size].reshape(self._whitening.z_shape), variables[:, self._z_size :]
 
-    def __call__(self, variables: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Values (N,) and gradients (N, V)."""
+    def __call__(self, variables: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+        """Values (N,), gradients (N, V), and which rows are in the cost's range (N,)."""
         z, theta = self.unpack(variables)
         plans = self._whitening.plan(z, theta)
         cost, grad_durations, grad_coefficients = self._cost.value_and_gradient(plans.durations_s, plans.coefficients)
@@ -203,7 +209,7 @@ class PlanObjective:
         grad = self._options.cost_weight * grad + 2.0 * weights * variables
         if self._options.timing == "fixed":
             grad[:, self._z_size :] = 0.0
-        return value, grad
+        return value, grad, _in_range(self._cost, plans)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -212,32 +218,42 @@ class _Judgement:
 
     cost: FloatArray
     max_error_m: FloatArray
-    out_of_range: tuple[str | None, ...]
 
     @staticmethod
     def of(cost: TrackingCost, plans: Trajectories) -> _Judgement:
         value, _, _ = cost.value_and_gradient(plans.durations_s, plans.coefficients)
         if not isinstance(cost, ErrorPredictor):
-            return _Judgement(value, np.full(len(plans), np.nan), (None,) * len(plans))
-        error = cost.predict_max_error_m(plans.durations_s, plans.coefficients)
-        return _Judgement(value, error, cost.out_of_range(plans.durations_s, plans.coefficients))
+            return _Judgement(value, np.full(len(plans), np.nan))
+        return _Judgement(value, cost.predict_max_error_m(plans.durations_s, plans.coefficients))
 
     def below(self, other: _Judgement) -> BoolArray:
         """(N,) whether the cost is lower, and the predicted error too where there is one."""
         return (self.cost < other.cost) & ~(self.max_error_m >= other.max_error_m)
 
 
-def _why_not(*, segments: int, failed: bool, improved: bool, strange: str | None) -> str | None:
-    """Why a row is minimum snap; None where its plan is good."""
+def _in_range(cost: TrackingCost, plans: Trajectories) -> BoolArray:
+    if isinstance(cost, ErrorPredictor):
+        return cost.in_range(plans.durations_s, plans.coefficients)
+    return np.ones(len(plans), dtype=bool)
+
+
+def _strangeness(cost: TrackingCost, plans: Trajectories) -> tuple[str | None, ...]:
+    if isinstance(cost, ErrorPredictor):
+        return cost.out_of_range(plans.durations_s, plans.coefficients)
+    return (None,) * len(plans)
+
+
+def _why_not(*, segments: int, failed: bool, improved: bool, mistrusted: bool, strange: str | None) -> str | None:
+    """Why a row is minimum snap; None where its plan is good. `strange` is about the last iterate."""
     if segments == 1:
         return "two waypoints leave nothing to choose"
     if failed:
         return "the cost or its gradient was not finite"
-    if not improved:
-        return "no plan was predicted to be better than minimum snap"
-    if strange is not None:
-        return f"outside what the cost was trained on: {strange}"
-    return None
+    if improved:
+        return None
+    if mistrusted:
+        return "better plans are outside what the cost was trained on" + (f": {strange}" if strange else "")
+    return "no plan was predicted to be better than minimum snap"
 
 
 def _position_snap(plans: Trajectories) -> FloatArray:

@@ -71,7 +71,8 @@ def test_the_objective_is_the_stated_one_with_its_slopes(timing: str) -> None:
     tasks, rng = some_tasks(5), np.random.default_rng(1)
     lowered = PlanObjective(Whitening.of(tasks.poses, tasks.durations_s(SPEED)), COST, PlannerOptions(timing=timing))
     variables, along = rng.normal(size=(2, 5, lowered.size)) * 0.1
-    value, grad = lowered(variables)
+    value, grad, in_range = lowered(variables)
+    assert in_range.all()
     np.testing.assert_allclose(value, objective(tasks, *lowered.unpack(variables)), rtol=1e-12)
     if timing == "fixed":
         lowered.unpack(along)[1][:] = 0.0
@@ -240,21 +241,40 @@ def test_a_plan_whose_predicted_error_is_not_lower_is_not_taken() -> None:
     assert plan(some_tasks(2), worse).fallback == ("no plan was predicted to be better than minimum snap",) * 2
 
 
-def test_a_plan_outside_the_training_range_falls_back_and_says_by_what() -> None:
-    free = plan(some_tasks(4, seed=3))
-    features = cost_models.segment_features(free.plans.durations_s, free.plans.coefficients)
-    narrow = replace(COST, feature_high=COST.feature_high.copy())
+def bounded(low: float, high: float) -> cost_models.CostModel:
+    """The test cost, trained on segments between two durations."""
     column = cost_models.FEATURE_NAMES.index("log duration")
-    narrow.feature_high[column] = np.sort(features[:, :, column].max(axis=1))[1] + 1e-9
-    narrow.feature_low[column] = -2.0 * abs(narrow.feature_high[column]) - 5.0
-    result = plan(some_tasks(4, seed=3), narrow)
-    outside = [reason for reason in result.fallback if reason is not None]
-    assert len(outside) == 2
-    assert all(r.startswith("outside what the cost was trained on: log duration of segment") for r in outside)
-    for n, reason in enumerate(result.fallback):
-        assert (result.cost[n] == result.minimum_snap_cost[n]) == (reason is not None)
-        wanted = result.minimum_snap if reason else free.plans
-        np.testing.assert_allclose(result.plans.coefficients[n], wanted.coefficients[n], atol=1e-9)
+    narrow = replace(COST, feature_low=COST.feature_low.copy(), feature_high=COST.feature_high.copy())
+    narrow.feature_low[column], narrow.feature_high[column] = np.log(low), np.log(high)
+    return narrow
+
+
+def test_the_best_plan_within_the_training_range_is_kept() -> None:
+    tasks = some_tasks(10, seed=3)
+    durations = tasks.durations_s(SPEED)
+    free = plan(tasks)
+    assert free.plans.durations_s.max() > durations.max() + 0.02
+    narrow = bounded(0.1, durations.max() + 0.01)
+    result = plan(tasks, narrow)
+    assert result.fallback == (None,) * 10
+    assert result.plans.durations_s.max() <= durations.max() + 0.01
+    assert narrow.in_range(result.plans.durations_s, result.plans.coefficients).all()
+    inside = free.plans.durations_s.max(axis=1) <= durations.max() + 0.01
+    assert inside.any()
+    assert not inside.all()
+    assert np.array_equal(result.plans.durations_s[inside], free.plans.durations_s[inside])
+
+
+def test_where_only_plans_outside_the_training_range_are_better_it_falls_back_and_says_by_what() -> None:
+    tasks = some_tasks(4, seed=3)
+    durations = tasks.durations_s(SPEED)[1]
+    result = plan(tasks, bounded(durations.min() - 1e-9, durations.max() + 1e-9))
+    reason = result.fallback[1]
+    assert reason is not None
+    assert reason.startswith("better plans are outside what the cost was trained on: log duration of segment")
+    assert np.array_equal(result.plans.coefficients[1], result.minimum_snap.coefficients[1])
+    assert result.cost[1] == result.minimum_snap_cost[1]
+    assert result.predicted_max_error_m[1] == result.minimum_snap_predicted_max_error_m[1]
 
 
 @pytest.mark.parametrize(

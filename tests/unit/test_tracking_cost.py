@@ -138,6 +138,7 @@ def test_plans_like_those_of_training_are_in_range_and_others_named() -> None:
     coefficients[2, 3, 1, 2] = 500.0
     durations[4, 2] = 9.0
     reasons = model.out_of_range(durations, coefficients)
+    assert [reason is None for reason in reasons] == model.in_range(durations, coefficients).tolist()
     assert reasons[0] is None or "yaw" not in reasons[0]
     assert reasons[2] is not None
     assert "yaw" in reasons[2]
@@ -175,6 +176,7 @@ def test_a_plan_that_is_not_finite_is_out_of_range_and_costs_nothing_finite() ->
     assert np.isfinite(value[0])
     assert np.isnan(value[1])
     assert model.out_of_range(durations, coefficients)[1] is not None
+    assert not model.in_range(durations, coefficients)[1]
 
 
 def test_extreme_plans_raise_no_warning() -> None:

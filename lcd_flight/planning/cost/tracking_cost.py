@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lcd_flight.model import FloatArray
+from lcd_flight.model import BoolArray, FloatArray
 from lcd_flight.planning.cost.features import FEATURE_NAMES, segment_features, segment_features_pullback
 from lcd_flight.planning.cost.network import Array, Network
 
@@ -113,16 +113,22 @@ class CostModel:
         """(N,) the largest error of each plan in m: that of its worst segment."""
         return np.asarray(self.predict_segment_errors_m(durations_s, coefficients).max(axis=1))
 
-    def out_of_range(self, durations_s: FloatArray, coefficients: FloatArray) -> tuple[str | None, ...]:
-        """For each plan None, or by what it leaves what the networks were trained on most."""
-        return tuple(self._excess(features) for features in segment_features(durations_s, coefficients))
+    def in_range(self, durations_s: FloatArray, coefficients: FloatArray) -> BoolArray:
+        """(N,) whether all features of a plan are within what the networks were trained on."""
+        features = segment_features(durations_s, coefficients)
+        inside = (features >= self.feature_low) & (features <= self.feature_high)
+        return np.asarray(inside.all(axis=(1, 2)))
 
-    def _excess(self, features: FloatArray) -> str | None:
+    def out_of_range(self, durations_s: FloatArray, coefficients: FloatArray) -> tuple[str | None, ...]:
+        """For each plan None, or which feature is farthest out."""
+        return tuple(self._farthest(features) for features in segment_features(durations_s, coefficients))
+
+    def _farthest(self, features: FloatArray) -> str | None:
         """What of features (S, F) is farthest out, in units of the range; None where all is inside."""
         low, high = self.feature_low, self.feature_high
-        out = np.abs(features - 0.5 * (low + high)) / (0.5 * (high - low))
-        segment, column = np.unravel_index(np.nan_to_num(out, nan=np.inf).argmax(), out.shape)
-        if out[segment, column] <= 1.0:
+        out = np.nan_to_num(np.maximum(low - features, features - high) / (high - low), nan=np.inf)
+        segment, column = np.unravel_index(out.argmax(), out.shape)
+        if out[segment, column] <= 0.0:
             return None
         value, bounds = features[segment, column], f"{low[column]:.3g} to {high[column]:.3g}"
         return f"{FEATURE_NAMES[column]} of segment {segment + 1} is {value:.3g}, trained on {bounds}"

@@ -309,7 +309,7 @@ class TestBreakage:
 
 
 def test_no_clean_flight_is_aborted() -> None:
-    """Twenty seeds of noise; `make campaign` flies a thousand."""
+    """Twenty seeds of noise."""
     for seed in range(20):
         result, listener = fly(seed=seed)
         gravest = [f.message for _, t in listener.flight for f in t.findings if f.severity >= Severity.BRAKE]

@@ -23,7 +23,7 @@ from lcd_flight.flight.result import FlightResult
 from lcd_flight.flight.session import FlightOptions, run_flight
 from lcd_flight.mission import Mission, load_mission
 from lcd_flight.mission.airframe import vehicle_of
-from lcd_flight.mission.plan_mission import PlannedMission, load_cost, plan_mission
+from lcd_flight.mission.plan_mission import PlannedMission, plan_mission
 from lcd_flight.model import RefusedError, Vehicle
 from lcd_flight.observers.log_thread import LogStatistics, LogThread
 from lcd_flight.record import FlightHeader, LogWriter, log_path, read_log
@@ -42,8 +42,6 @@ class PreparedFlight:
     mission: Mission
     vehicle: Vehicle
     planned: PlannedMission
-    model_card: dict[str, object]
-    """Of the learned cost; empty where there is none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,9 +64,7 @@ def plan(mission: Mission | str | Path) -> PreparedFlight:
     """
     loaded = mission if isinstance(mission, Mission) else load_mission(mission)
     vehicle = vehicle_of(loaded)
-    cost = None if loaded.planner.type == "minimum-snap" else load_cost(loaded, vehicle)
-    card = {} if cost is None or cost.card is None else cost.card.model_dump(mode="json")
-    return PreparedFlight(loaded, vehicle, plan_mission(loaded, vehicle, cost), card)
+    return PreparedFlight(loaded, vehicle, plan_mission(loaded, vehicle))
 
 
 def rehearse(
@@ -127,7 +123,7 @@ def _header(
     flight: PreparedFlight, rehearsal: Rehearsal, options: FlightOptions, started: datetime.datetime
 ) -> FlightHeader:
     """What the log says of the flight before it begins."""
-    mission = flight.mission
+    mission, card = flight.mission, flight.planned.card
     return FlightHeader(
         name=mission.name,
         mission_text=mission.source.text,
@@ -138,7 +134,7 @@ def _header(
         seed=mission.seed,
         started=started,
         planner=mission.planner.type,
-        model_card=flight.model_card,
+        model_card={} if card is None else card.model_dump(mode="json"),
         predicted_max_error_m=rehearsal.max_error_m,
         notes={"rehearsal": rehearsal.text},
     )

@@ -103,7 +103,12 @@ def flight_plan(mission: Mission, planned: Sequence[Planned]) -> FlightPlan:
 def _trajectory_legs(mission: Mission, pose: FloatArray, task: TrajectoryTask, planned: Planned) -> Iterator[Leg]:
     yield legs.transfer(pose, task.waypoints[0], mission.planner.transfer_speed_m_per_s, task.item)
     yield Leg(
-        LegKind.TRAJECTORY, planned.trajectory, waypoints=task.waypoints, baseline=planned.baseline, item=task.item
+        LegKind.TRAJECTORY,
+        planned.trajectory,
+        waypoints=task.waypoints,
+        settle=True,
+        baseline=planned.baseline,
+        item=task.item,
     )
 
 

@@ -10,6 +10,7 @@ from lcd_flight.mission.assemble import Planned, TrajectoryTask, flight_plan, tr
 from lcd_flight.mission.mission import Mission
 from lcd_flight.mission.path_checks import require_flyable
 from lcd_flight.model import FlightPlan, FloatArray, Vehicle
+from lcd_flight.planning.cost.model_card import ModelCard
 from lcd_flight.planning.cost.model_file import SUFFIX, check_fits, load_model, model_names
 from lcd_flight.planning.cost.tracking_cost import CostModel
 from lcd_flight.planning.limits import Peaks, peaks
@@ -52,6 +53,8 @@ class PlannedMission:
     plan: FlightPlan
     summaries: tuple[TrajectorySummary, ...]
     """One for each trajectory of the mission, in order."""
+    card: ModelCard | None = None
+    """Of the learned cost, where one was used."""
 
 
 def plan_mission(mission: Mission, vehicle: Vehicle, cost: TrackingCost | None = None) -> PlannedMission:
@@ -71,7 +74,7 @@ def plan_mission(mission: Mission, vehicle: Vehicle, cost: TrackingCost | None =
     made = [_plan(task, mission, vehicle, cost) for task in tasks]
     plan = flight_plan(mission, [planned for planned, _ in made])
     require_flyable(plan, mission, vehicle)
-    return PlannedMission(plan, tuple(summary for _, summary in made))
+    return PlannedMission(plan, tuple(summary for _, summary in made), _card(cost))
 
 
 def load_cost(mission: Mission, vehicle: Vehicle) -> CostModel:
@@ -103,8 +106,12 @@ def _options(task: TrajectoryTask, mission: Mission, cost: TrackingCost) -> Plan
     """Times that the mission gives are kept; a model's card knows the weight of snap that suits it."""
     timing: Timing = "fixed" if task.times_given else "retimed"
     options = PlannerOptions(timing=timing, cost_weight=mission.planner.weight)
-    card = cost.card if isinstance(cost, CostModel) else None
+    card = _card(cost)
     return options if card is None else replace(options, snap_weight=card.snap_weight)
+
+
+def _card(cost: TrackingCost | None) -> ModelCard | None:
+    return cost.card if isinstance(cost, CostModel) else None
 
 
 def _summary(

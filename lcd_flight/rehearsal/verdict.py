@@ -82,14 +82,21 @@ class Rehearsal:
         )
         return f"{found}: pass" if self.passed else f"{found}: refused; trouble begins in {self.where}"
 
+    @property
+    def refusal(self) -> str:
+        """Why the flight is refused, where, and what helps; empty where it passed."""
+        if self.passed:
+            return ""
+        return (
+            f"rehearsal: {self.text}; lower planner.speed, let planner.type be learned, or look at the faults in "
+            "rehearse.faults"
+        )
+
     def require(self) -> None:
         """Do nothing if it passed.
 
         Raises:
-            RefusedError: it did not; says why, where, and what helps.
+            RefusedError: it did not; `refusal` says why.
         """
         if not self.passed:
-            raise RefusedError(
-                f"rehearsal: {self.text}; lower planner.speed, let planner.type be learned, or look at the faults in "
-                "rehearse.faults"
-            )
+            raise RefusedError(self.refusal)

@@ -189,6 +189,7 @@ class PlanObjective:
 
     def __init__(self, whitening: Whitening, cost: TrackingCost, options: PlannerOptions) -> None:
         self._whitening, self._cost, self._options = whitening, cost, options
+        self._predictor = cost if isinstance(cost, ErrorPredictor) else None
         self._z_size = math.prod(whitening.z_shape[1:])
         self.size = self._z_size + whitening.durations_s.shape[1]
 
@@ -209,7 +210,9 @@ class PlanObjective:
         grad = self._options.cost_weight * grad + 2.0 * weights * variables
         if self._options.timing == "fixed":
             grad[:, self._z_size :] = 0.0
-        return value, grad, _in_range(self._cost, plans)
+        if self._predictor is None:
+            return value, grad, np.ones(len(plans), dtype=bool)
+        return value, grad, self._predictor.in_range(plans.durations_s, plans.coefficients)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -229,12 +232,6 @@ class _Judgement:
     def below(self, other: _Judgement) -> BoolArray:
         """(N,) whether the cost is lower, and the predicted error too where there is one."""
         return (self.cost < other.cost) & ~(self.max_error_m >= other.max_error_m)
-
-
-def _in_range(cost: TrackingCost, plans: Trajectories) -> BoolArray:
-    if isinstance(cost, ErrorPredictor):
-        return cost.in_range(plans.durations_s, plans.coefficients)
-    return np.ones(len(plans), dtype=bool)
 
 
 def _strangeness(cost: TrackingCost, plans: Trajectories) -> tuple[str | None, ...]:

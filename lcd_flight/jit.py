@@ -11,10 +11,22 @@ import hashlib
 import os
 import types
 from collections.abc import Callable, Iterable
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
+from lcd_flight.errors import RefusedError
+
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+_tell: Callable[[str], None] | None = None
+"""Who wants to know of compilations."""
+
+
+def announce_compilation(tell: Callable[[str], None]) -> None:
+    """Have `tell` called with a kernel's name whenever one is compiled rather than loaded: that takes seconds."""
+    global _tell  # noqa: PLW0603 - numba's listeners are one for the process, too
+    _tell = tell
 
 
 def cache_folder() -> Path:
@@ -41,6 +53,7 @@ class Compiler:
         import numba
         from numba.core import config
 
+        _listen()
         linked = _relink(function, self._inlined)
         before = config.CACHE_DIR  # type: ignore[attr-defined]
         config.CACHE_DIR = str(self._cache())  # type: ignore[attr-defined]
@@ -56,14 +69,36 @@ class Compiler:
 
             # A loop over vehicles is vectorised only where nothing is called; nobody but kernels calls the helpers.
             inlined = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-            self._helpers[function] = numba.njit(**inlined, **self._options)(_relink(function, self._inlined))
+            options: dict[str, Any] = {**inlined, **self._options}
+            self._helpers[function] = numba.njit(**options)(_relink(function, self._inlined))
         return self._helpers[function]
 
     def _cache(self) -> Path:
         if self._folder is None:
-            self._folder = cache_folder() / "kernels" / _digest(self._sources)
-            self._folder.mkdir(parents=True, exist_ok=True)
+            folder = cache_folder() / "kernels" / _digest(self._sources)
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                remedy = "set LCD_CACHE_DIR to a folder that can be written to"
+                raise RefusedError(f"cannot keep compiled kernels in {folder}: {error.strerror}; {remedy}") from error
+            self._folder = folder
         return self._folder
+
+
+@cache
+def _listen() -> None:
+    """Hear of what numba compiles, once in a process."""
+    from numba.core import event
+
+    class Announcer(event.Listener):
+        def on_start(self, event: Any) -> None:
+            if _tell is not None:
+                _tell(event.data["dispatcher"].py_func.__name__)
+
+        def on_end(self, event: Any) -> None:
+            """Nothing is told of the end."""
+
+    event.register("numba:compile", Announcer())  # type: ignore[no-untyped-call]
 
 
 def _relink(function: Callable[..., Any], replace: Callable[[Callable[..., Any]], Any]) -> types.FunctionType:

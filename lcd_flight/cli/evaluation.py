@@ -45,6 +45,7 @@ def evaluate(
     if timing not in ("retimed", "fixed"):
         raise InputError(f"--timing {timing}: choose retimed or fixed")
     terminal = Terminal(json_line=json, quiet=quiet, color=not no_color)
+    terminal.announce_compilation()
     where = load_world(world)
     if waypoints is not None:
         where = replace(where, sampler=replace(where.sampler, waypoints=waypoints))

@@ -42,6 +42,7 @@ def fly(
     if sim and link is not None:
         raise InputError("--sim and --link exclude each other; leave one out")
     terminal = Terminal(json_line=json, quiet=quiet, color=not no_color)
+    terminal.announce_compilation()
     flight = tell_plan(terminal, mission)
     rehearsal = _rehearse(terminal, flight, rehearse)
     facts = {"predicted_max_error_m": rehearsal.max_error_m, "log": None, "report": None}

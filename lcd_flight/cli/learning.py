@@ -33,6 +33,7 @@ def collect(
     from lcd_flight.worlds import load_world
 
     terminal = Terminal(json_line=json, quiet=quiet, color=not no_color)
+    terminal.announce_compilation()
     config = CollectConfig(load_world(world), seed)
     with following(terminal, "COLLECT") as progress:
         dataset = collect_rollouts(config, count, out, plugins.simulator(), progress)
@@ -67,6 +68,7 @@ def train(
     if out.suffix != ".safetensors":
         raise InputError(f"--out {out}: a model's file ends in .safetensors")
     terminal = Terminal(json_line=json, quiet=quiet, color=not no_color)
+    terminal.announce_compilation()
     config = RECIPES[recipe](out.stem, tuple(load_world(name.strip()) for name in worlds.split(",")), seed)
     folder = work or Path("data") / f"{out.stem}-{recipe}-{seed}"
     with following(terminal, "TRAIN") as progress:

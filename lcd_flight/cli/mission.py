@@ -33,6 +33,7 @@ def check(mission: MissionArgument, json: Json = False, quiet: Quiet = False, no
 def plan(mission: MissionArgument, json: Json = False, quiet: Quiet = False, no_color: NoColor = False) -> int:
     """Plan a mission and show snap, predicted error and peak thrust beside minimum snap; flies nothing."""
     terminal = Terminal(json_line=json, quiet=quiet, color=not no_color)
+    terminal.announce_compilation()
     flight = tell_plan(terminal, mission)
     return terminal.finish(Outcome.OK, plan_facts(flight))
 

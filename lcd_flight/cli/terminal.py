@@ -61,6 +61,19 @@ class Terminal:
             )
         return self._console
 
+    def announce_compilation(self) -> None:
+        """Say once that kernels are being compiled, should that be so: it happens on first use and takes a while."""
+        from lcd_flight import jit
+
+        told: list[str] = []
+
+        def tell(kernel: str) -> None:
+            if not told:
+                self.line("COMPILE", "first use of this version: compiling kernels, about half a minute")
+            told.append(kernel)
+
+        jit.announce_compilation(tell)
+
     @property
     def interactive(self) -> bool:
         """Whether a person is watching and can see lines change in place."""

@@ -18,24 +18,32 @@ SUBSTEPS = 2
 """Runge-Kutta steps of a tick in the paper's loop: 0.05 mm from the converged solution over 4.5 s."""
 
 
-def craft_of(vehicle: Vehicle, nominal: Vehicle, loop: Loop) -> Craft:
+_FEED_FORWARD = {"geometric": False, "geometric-feed-forward": True}
+"""The controllers there are, and whether they add the paper's last term (decision 0011: they fly worse with it)."""
+
+
+def craft_of(vehicle: Vehicle, nominal: Vehicle, loop: Loop, controller: str = "geometric") -> Craft:
     """A vehicle with the controllers of a loop, which believe that they fly `nominal`.
 
     Raises:
-        InputError: a loop or a vehicle that the simulator cannot fly.
+        InputError: a loop, a controller or a vehicle that the simulator cannot fly.
     """
+    if controller not in _FEED_FORWARD:
+        raise InputError(f"controller {controller!r} is not known to the simulator; it has: {', '.join(_FEED_FORWARD)}")
     if loop not in ("paper", "flight"):
         raise InputError(f"loop {loop!r} is not known to the simulator; it has: paper, flight")
     flight_loop = loop == "flight"
+    if flight_loop and _FEED_FORWARD[controller]:
+        raise InputError(f"controller {controller!r} acts on moments, which the flight loop leaves to the vehicle")
     try:
-        air, controller = airframe(vehicle), onboard(vehicle, nominal) if flight_loop else NO_ONBOARD
+        air, below = airframe(vehicle), onboard(vehicle, nominal) if flight_loop else NO_ONBOARD
     except ValueError as error:
         raise InputError(str(error)) from error
-    steps = round(TICK_S / controller.period_s) if flight_loop else SUBSTEPS
+    steps = round(TICK_S / below.period_s) if flight_loop else SUBSTEPS
     return Craft(
         air=air,
-        law=_law_of(nominal, nominal.flight_gains if flight_loop else nominal.gains),
-        onboard=controller,
+        law=_law_of(nominal, nominal.flight_gains if flight_loop else nominal.gains, _FEED_FORWARD[controller]),
+        onboard=below,
         flight_loop=flight_loop,
         steps=steps,
         step_s=TICK_S / steps,
@@ -45,7 +53,7 @@ def craft_of(vehicle: Vehicle, nominal: Vehicle, loop: Loop) -> Craft:
     )
 
 
-def _law_of(vehicle: Vehicle, gains: GeometricGains) -> Law:
+def _law_of(vehicle: Vehicle, gains: GeometricGains, feed_forward: bool) -> Law:
     """The geometric law as a vehicle's controller has it."""
     return Law(
         mass_kg=vehicle.mass_kg,
@@ -55,6 +63,7 @@ def _law_of(vehicle: Vehicle, gains: GeometricGains) -> Law:
         attitude_gain=gains.attitude,
         rate_gain=gains.body_rates,
         allocation=_allocation(vehicle),
+        feed_forward=feed_forward,
         integral_gain=gains.integral,
         integral_limit=gains.integral_limit,
         thrust_limit_N=thrust_limit_N(vehicle),

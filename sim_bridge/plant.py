@@ -17,7 +17,7 @@ from sim_bridge.kernels.lane import MAX_RATE, MAX_SPEED
 from sim_bridge.kernels.multirotor import Motion
 from sim_bridge.kernels.onboard import received, roll_pitch_yaw
 from sim_bridge.kernels.plant import IMPACT_SPEED, IMPACT_UPRIGHT
-from sim_bridge.kernels.rows import LANES, ROWS, load4, load_motion, store3, store_motion
+from sim_bridge.kernels.rows import LANES, ROWS, load4, load_motion, store3, store4, store_motion
 
 CRASH_SPEED = 3.0
 """m/s downward at touchdown; as if dropped from half a metre."""
@@ -27,19 +27,28 @@ _NS_PER_S = 1_000_000_000
 
 
 class Plant:
-    """A vehicle that stands on the floor beneath its initial state (or flies from it), its motors off.
+    """A vehicle that stands on the floor with its motors off, or begins in the air with its rotors carrying it.
 
-    setpoints apply from the next period of the onboard controller (2 ms at 500 Hz).
+    floor_m: height of the floor in the world; None: it stands. battery_V: at rest; None: full. Setpoints apply from the
+    next period of the onboard controller (2 ms at 500 Hz).
 
     Raises:
         InputError: the vehicle has no onboard controller.
     """
 
-    def __init__(self, vehicle: Vehicle, state: State, seed: int, *, battery_V: float | None = None) -> None:
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        state: State,
+        seed: int,
+        *,
+        battery_V: float | None = None,
+        floor_m: float | None = None,
+    ) -> None:
         self._craft = craft_of(vehicle, vehicle, "flight")
         self._weight_N = vehicle.weight_N
         self._seed = np.uint64(seed % 2**64)
-        self._floor_m = state.p_WB[2]
+        self._floor_m = state.p_WB[2] if floor_m is None else floor_m
         self._period_ns = round(_NS_PER_S * self._craft.step_s)
         self._periods = self._left_ns = 0
         self._memory = np.zeros(ROWS * LANES)
@@ -48,6 +57,8 @@ class Plant:
         self._setpoint: AttitudeThrust | None = None
         store_motion(self._memory, rows.MOTION, 0, Motion(state.p_WB, state.v_WB_W, state.q_WB, state.w_WB_B))
         store3(self._memory, rows.PID + 6, 0, roll_pitch_yaw(rotation_of(state.q_WB)))
+        if not self.on_ground:
+            store4(self._memory, rows.SPEEDS, 0, (self._craft.initial_speed,) * 4)
         self.crashed = False
         """Whether it hit the floor hard or tilted, or left what the model holds for; its motors have stopped."""
 

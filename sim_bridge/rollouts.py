@@ -16,8 +16,8 @@ from sim_bridge.kernels.lane import TICK_S
 from sim_bridge.kernels.rollout import LABELS, Plans, Results
 from sim_bridge.kernels.rows import LANES
 
-_BLOCKS_AT_A_TIME = 4
-"""Handed to a thread in one call: small enough to share evenly and to be interrupted soon."""
+_MOST_BLOCKS_AT_A_TIME = 4
+"""Handed to a thread in one call: few, to share them evenly and to be interrupted soon."""
 
 
 class MultirotorSimulator:
@@ -33,13 +33,13 @@ class MultirotorSimulator:
         Raises:
             InputError: a plan that is not finite, a controller or loop that this simulator does not know.
         """
-        return labels_of(_fly(plans, vehicle, seeds, options, ticks=0))
+        return labels_of(fly(plans, vehicle, seeds, options))
 
 
-def _fly(plans: Trajectories, vehicle: Vehicle, seeds: SeedArray, options: RolloutOptions, ticks: int) -> Results:
-    """Run the kernel over all rows; record the memory of the first `ticks` ticks."""
+def fly(plans: Trajectories, vehicle: Vehicle, seeds: SeedArray, options: RolloutOptions, ticks: int = 0) -> Results:
+    """Run the kernel over all rows; record its memory of the first `ticks` ticks (of one block: at most LANES rows)."""
     prepared = _prepare(plans, seeds, options)
-    craft = craft_of(vehicle, options.nominal or vehicle, options.loop)
+    craft = craft_of(vehicle, options.nominal or vehicle, options.loop, options.controller)
     count, segments = plans.durations_s.shape
     results = Results(
         labels=np.empty((count, LABELS)),
@@ -54,16 +54,17 @@ def _fly(plans: Trajectories, vehicle: Vehicle, seeds: SeedArray, options: Rollo
 def _over_blocks(blocks: int, threads: int, arguments: tuple[Any, ...]) -> None:
     """Share the blocks among threads; the kernel holds no lock."""
     kernel = rollout_kernel()
-    starts = range(0, blocks, _BLOCKS_AT_A_TIME)
-    if threads == 1 or len(starts) <= 1:
-        for start in starts:
-            kernel(start, min(start + _BLOCKS_AT_A_TIME, blocks), *arguments)
+    size = max(1, min(_MOST_BLOCKS_AT_A_TIME, blocks // threads))
+    parts = [(start, min(start + size, blocks)) for start in range(0, blocks, size)]
+    if threads == 1 or len(parts) <= 1:
+        for part in parts:
+            kernel(*part, *arguments)
         return
     with ThreadPoolExecutor(threads) as pool:
-        work = [pool.submit(kernel, s, min(s + _BLOCKS_AT_A_TIME, blocks), *arguments) for s in starts]
+        work = [pool.submit(kernel, *part, *arguments) for part in parts]
         try:
-            for part in work:
-                part.result()
+            for done in work:
+                done.result()
         except BaseException:
             pool.shutdown(wait=True, cancel_futures=True)
             raise
@@ -73,7 +74,7 @@ def _prepare(plans: Trajectories, seeds: SeedArray, options: RolloutOptions) -> 
     """The kernel's view of a batch."""
     durations = np.ascontiguousarray(plans.durations_s, dtype=np.float64)
     coefficients = np.ascontiguousarray(plans.coefficients, dtype=np.float64)
-    _check(durations, coefficients, seeds, options)
+    _check(durations, coefficients, seeds)
     knots = np.concatenate([np.zeros((len(durations), 1)), np.cumsum(durations, axis=1)], axis=1)
     end_ticks = np.ceil(knots[:, 1:] / TICK_S - 1e-9).astype(np.int64)
     yaws = coefficients[:, 3, 0, 0] if options.start_aligned else np.zeros(len(durations))
@@ -93,10 +94,8 @@ def _prepare(plans: Trajectories, seeds: SeedArray, options: RolloutOptions) -> 
     )
 
 
-def _check(durations: FloatArray, coefficients: FloatArray, seeds: SeedArray, options: RolloutOptions) -> None:
+def _check(durations: FloatArray, coefficients: FloatArray, seeds: SeedArray) -> None:
     """Refuse what cannot be flown."""
-    if options.controller != "geometric":
-        raise InputError(f"controller {options.controller!r} is not known to the simulator; it has: geometric")
     if len(seeds) != len(durations):
         raise InputError(f"{len(durations)} plans need as many seeds, got {len(seeds)}")
     if not (np.isfinite(coefficients).all() and np.isfinite(durations).all() and (durations > 0.0).all()):

@@ -132,6 +132,42 @@ def moment(
     )
 
 
+def moment_feed_forward(
+    R_WB: Rotation,
+    R_WD: Rotation,
+    w_WB_B: Vector3,
+    w_WD_D: Vector3,
+    dw_WD_D: Vector3,
+    inertia_kg_m2: Vector3,
+) -> Vector3:
+    """The paper's last term, -J (w^ R' R_d w_d - R' R_d dw_d / dt) in N m, body; RotorPy's form drops it.
+
+    w_WD_D, dw_WD_D: desired body rates in rad/s and their derivative in rad/s^2, in the desired frame.
+    """
+    rates = into_body(R_WB, into_world(R_WD, w_WD_D))
+    accelerations = into_body(R_WB, into_world(R_WD, dw_WD_D))
+    carried = cross(w_WB_B, rates)
+    return (
+        inertia_kg_m2[0] * (accelerations[0] - carried[0]),
+        inertia_kg_m2[1] * (accelerations[1] - carried[1]),
+        inertia_kg_m2[2] * (accelerations[2] - carried[2]),
+    )
+
+
+def into_world(R_WB: Rotation, v_B: Vector3) -> Vector3:
+    """R v."""
+    return (
+        R_WB[0][0] * v_B[0] + R_WB[1][0] * v_B[1] + R_WB[2][0] * v_B[2],
+        R_WB[0][1] * v_B[0] + R_WB[1][1] * v_B[1] + R_WB[2][1] * v_B[2],
+        R_WB[0][2] * v_B[0] + R_WB[1][2] * v_B[1] + R_WB[2][2] * v_B[2],
+    )
+
+
+def into_body(R_WB: Rotation, v_W: Vector3) -> Vector3:
+    """R' v."""
+    return (dot(R_WB[0], v_W), dot(R_WB[1], v_W), dot(R_WB[2], v_W))
+
+
 def rotor_speeds(thrust_N: float, moment_N_m: Vector3, allocation: Allocation) -> Row4:
     """Rotor speeds in rad/s before any limit; where a force would have to be negative, so is the speed."""
     a, b, c, d = allocation.inverse

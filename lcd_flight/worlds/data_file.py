@@ -20,14 +20,15 @@ class Strict(BaseModel):
 
 
 class _UniqueKeys(yaml.SafeLoader):
-    """PyYAML keeps the last of two equal keys; here a second one is an error."""
+    """PyYAML keeps the last of two equal keys and takes anything as a key; here both are errors."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         seen = set()
         for key_node, _ in node.value:
             key = self.construct_object(key_node, deep=True)
-            if key in seen:
-                raise yaml.constructor.ConstructorError(None, None, f"key {key!r} stands twice", key_node.start_mark)
+            if not isinstance(key, str) or key in seen:
+                problem = f"key {key!r} stands twice" if isinstance(key, str) else f"key {key!r} is not a word"
+                raise yaml.constructor.ConstructorError(None, None, problem, key_node.start_mark)
             seen.add(key)
         return super().construct_mapping(node, deep)
 
@@ -76,7 +77,7 @@ def _problem(error: Any) -> str:
     if error["type"] == "extra_forbidden":
         return f"{key}: unknown key; remove it or correct its spelling"
     if error["type"] == "float_type" and _looks_like_number(value):
-        return f"{key}: {value!r} is text to YAML; write {float(value)!r} (a number needs a point before its exponent)"
+        return f"{key}: {value!r} is text to YAML; write {yaml.safe_dump(float(value)).split()[0]}"
     return f"{key}: {value!r}: {error['msg'].removeprefix('Value error, ')}"
 
 

@@ -19,6 +19,7 @@ from lcd_flight.control.geometric import (
     clipped,
     dot,
     moment,
+    moment_feed_forward,
     rotation_of,
     rotor_speeds,
     scaled,
@@ -59,6 +60,8 @@ class Law(NamedTuple):
     attitude_gain: float
     rate_gain: float
     allocation: Allocation
+    feed_forward: bool
+    """Whether the paper's last term, which RotorPy drops, is added to the moment."""
     integral_gain: Vector3
     integral_limit: float
     thrust_limit_N: float
@@ -72,6 +75,7 @@ class Sample(NamedTuple):
     a_W: Vector3
     yaw_rad: float
     yaw_rate: float
+    yaw_acceleration: float
 
 
 def remember(memory: FloatArray, lane: int) -> None:
@@ -145,8 +149,7 @@ def refer(memory: FloatArray, lane: int, tick: float) -> None:
     store3(memory, rows.REFERENCE, lane, (x[0], y[0], z[0]))
     store3(memory, rows.REFERENCE + 3, lane, (x[1], y[1], z[1]))
     store3(memory, rows.REFERENCE + 6, lane, (x[2], y[2], z[2]))
-    memory[(rows.REFERENCE + 9) * LANES + lane] = yaw[0]
-    memory[(rows.REFERENCE + 10) * LANES + lane] = yaw[1]
+    store3(memory, rows.REFERENCE + 9, lane, yaw)
 
 
 def reference(memory: FloatArray, lane: int) -> Sample:
@@ -157,6 +160,7 @@ def reference(memory: FloatArray, lane: int) -> Sample:
         load3(memory, rows.REFERENCE + 6, lane),
         memory[(rows.REFERENCE + 9) * LANES + lane],
         memory[(rows.REFERENCE + 10) * LANES + lane],
+        memory[(rows.REFERENCE + 11) * LANES + lane],
     )
 
 
@@ -215,6 +219,10 @@ def command_rotors(memory: FloatArray, lane: int, law: Law, air: Airframe) -> No
     R_WB = rotation_of(q)
     R_WD = attitude_setpoint(force, cos_sin(ref.yaw_rad))
     turn = moment(R_WB, R_WD, w, ref.yaw_rate, law.inertia_kg_m2, law.attitude_gain, law.rate_gain)
+    if law.feed_forward:
+        desired, change = (0.0, 0.0, ref.yaw_rate), (0.0, 0.0, ref.yaw_acceleration)
+        more = moment_feed_forward(R_WB, R_WD, w, desired, change, law.inertia_kg_m2)
+        turn = (turn[0] + more[0], turn[1] + more[1], turn[2] + more[2])
     wanted = rotor_speeds(dot(force, R_WB[2]), turn, law.allocation)
     low, high = air.speed_min, air.speed_max
     given = (

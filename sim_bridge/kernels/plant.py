@@ -27,18 +27,20 @@ def fly_periods(
     """Fly periods `first` to `first` + `count` - 1 of lane 0; noise comes at the end of each tick."""
     key = key_of(seed)
     for period in range(first, first + count):
+        before = load_motion(memory, rows.MOTION, 0)
         stabilise(memory, 0, craft.air, craft.onboard)
         advance(memory, 0, craft.air, craft.step_s, craft.motor_decay)
         spins = memory[rows.SETPOINT * LANES] > 0.0
         if (period + 1) % craft.steps == 0 and craft.motor_noise > 0.0 and spins:
             disturb(memory, 0, key, np.uint64((period + 1) // craft.steps), craft.air, craft.motor_noise)
-        motion = load_motion(memory, rows.MOTION, 0)
-        if motion.p_WB[2] < floor_m:
-            meet_floor(memory, contact, motion, floor_m)
+        after = load_motion(memory, rows.MOTION, 0)
+        if after.p_WB[2] < floor_m:
+            stood = before.p_WB[2] <= floor_m
+            meet_floor(memory, contact, before if stood else after, floor_m)
 
 
 def meet_floor(memory: FloatArray, contact: FloatArray, motion: Motion, floor_m: float) -> None:
-    """It stands, level, where it touched; friction holds it. Thrust above weight lifts it off again by itself."""
+    """It stands, level, where it stood or touched; friction holds it. Thrust above weight lifts it off by itself."""
     x, y, z, w = motion.q_WB
     upright = 1.0 - 2.0 * (x * x + y * y)
     contact[IMPACT_SPEED] = max(contact[IMPACT_SPEED], -motion.v_WB_W[2])

@@ -81,7 +81,7 @@ class Results(NamedTuple):
     waypoint_errors: FloatArray
     """(N, S + 1) m; NaN where never reached."""
     trace: FloatArray
-    """(ticks, ROWS * LANES) the whole memory after each tick, or nothing."""
+    """(ticks, ROWS * LANES) the whole memory at each tick, before its command; or nothing."""
 
 
 def fly(first: int, last: int, plans: Plans, craft: Craft, results: Results) -> None:
@@ -158,14 +158,14 @@ def fly_block(
         for lane in range(LANES):
             judge(memory, lane, float(tick))
             count_clips(memory, lane, float(tick))
+        if tick < len(results.trace):
+            results.trace[tick] = memory
         if craft.flight_loop:
             for lane in range(LANES):
                 command_attitude(memory, lane, craft.law, craft.onboard)
         else:
             for lane in range(LANES):
                 command_rotors(memory, lane, craft.law, craft.air)
-        if tick < len(results.trace):
-            results.trace[tick] = memory
         tick += 1
 
 

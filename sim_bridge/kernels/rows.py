@@ -24,8 +24,8 @@ BEFORE = COMMANDS + 4
 SEEN = BEFORE + 6
 """13: the motion as the controller is given it; it coasts while the pose is missing."""
 REFERENCE = SEEN + 13
-"""11: position, velocity, acceleration, yaw in rad, yaw rate."""
-INTEGRAL = REFERENCE + 11
+"""12: position, velocity, acceleration; yaw in rad, its rate and acceleration."""
+INTEGRAL = REFERENCE + 12
 """3: acceleration in m/s^2 that the law's integral asks for."""
 SETPOINT = INTEGRAL + 3
 """4: thrust in counts; roll, pitch, yaw in deg."""

@@ -9,6 +9,7 @@ from simulator_plans import minimum_snap_plans, seeds
 
 from lcd_flight.model import InputError, Loop, RolloutOptions, Trajectories, Trajectory
 from lcd_flight.worlds import load_vehicle
+from sim_bridge.kernels.lane import MAX_RATE, MAX_SPEED
 from sim_bridge.rollouts import MultirotorSimulator
 from sim_bridge.trace import RolloutTrace, trace
 
@@ -77,13 +78,14 @@ def test_a_rollout_that_leaves_the_models_validity_ends_there() -> None:
     labels = MultirotorSimulator().rollout(plans, HUMMINGBIRD, seeds(1000), RolloutOptions())
     left = np.nonzero(~labels.valid)[0]
     assert len(left) > 0
+    assert (MAX_SPEED, MAX_RATE) == (20.0, 100.0)
     assert labels.crashed[left].all()
     for index in left[:5]:
         plan = plans[int(index)]
         flight = trace(plan, HUMMINGBIRD, int(index), RolloutOptions())
         assert len(flight.times_s) < int(np.ceil(plan.duration_s / 0.01)) + 1
-        assert np.abs(flight.v_WB_W).max() <= 20.0
-        assert np.abs(flight.w_WB_B).max() <= 100.0
+        assert np.abs(flight.v_WB_W).max() <= MAX_SPEED
+        assert np.abs(flight.w_WB_B).max() <= MAX_RATE
         check(flight, plan)
         assert np.isnan(flight.labels.waypoint_error_m[0, -1])
 

@@ -9,7 +9,8 @@ from functools import cache
 
 import numpy as np
 
-from lcd_flight.flight.setup import FlightSetup, Memory
+from lcd_flight.flight.memory import Memory
+from lcd_flight.flight.setup import FlightSetup
 from lcd_flight.flight.tick import tick
 from lcd_flight.model import (
     GRAVITY_M_PER_S2,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from lcd_flight.flight.setup import FlightSetup, Memory
+from lcd_flight.flight.memory import Memory
+from lcd_flight.flight.setup import FlightSetup
 from lcd_flight.model import (
     GRAVITY_M_PER_S2,
     AttitudeThrust,

@@ -9,9 +9,10 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Sequence
 
+from lcd_flight.flight.memory import Memory
 from lcd_flight.flight.rate import RateKeeper, Wake
 from lcd_flight.flight.result import LoopFigures
-from lcd_flight.flight.setup import FlightSetup, Memory
+from lcd_flight.flight.setup import FlightSetup
 from lcd_flight.flight.tick import tick
 from lcd_flight.model import (
     Clock,

@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from lcd_flight.flight.setup import FlightSetup, Memory
+from lcd_flight.flight.memory import Memory
+from lcd_flight.flight.setup import FlightSetup
 from lcd_flight.flight.tick import tick
 from lcd_flight.model import AttitudeThrust, Tick, TickInputs
 from lcd_flight.model.frames import angle_between

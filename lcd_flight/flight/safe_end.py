@@ -6,8 +6,9 @@ It leans on nothing that may have failed: no pose, no control law, no observers.
 from __future__ import annotations
 
 from lcd_flight.flight.manoeuvres import blind_setpoint, blind_time_s
+from lcd_flight.flight.memory import Memory
 from lcd_flight.flight.rate import RateKeeper
-from lcd_flight.flight.setup import FlightSetup, Memory
+from lcd_flight.flight.setup import FlightSetup
 from lcd_flight.model import Clock, Link, Phase
 from lcd_flight.model.frames import yaw_of
 

@@ -1,17 +1,20 @@
-"""What a flight is made of before it begins (FlightSetup), and what one tick hands to the next (Memory)."""
+"""What a flight is made of before it begins."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass
 from typing import Protocol
+
+import numpy as np
 
 from lcd_flight.control import flight_law
 from lcd_flight.flight.manoeuvres import pressed_down
 from lcd_flight.model import (
+    GRAVITY_M_PER_S2,
     AttitudeThrust,
     FlightPlan,
     LegKind,
-    Phase,
     Reference,
     SafetyLimits,
     State,
@@ -19,9 +22,11 @@ from lcd_flight.model import (
     Vector3,
     Vehicle,
 )
-from lcd_flight.safety.evidence import SafetyMemory
 from lcd_flight.safety.gate import GateLimits
 from lcd_flight.safety.monitors import Monitor, monitors
+
+SPARE_SHARE = 0.85
+"""Of the thrust limit: a plan that stays below leaves what control needs."""
 
 
 class ControlLaw(Protocol):
@@ -46,6 +51,9 @@ class FlightSetup:
     """Of each leg, as flown: a landing goes on to below the ground."""
     lowest_planned_z_m: float
     """Of the plan's start and its landings."""
+    foreseen_saturation: tuple[bool, ...]
+    """For each leg, whether its plan alone comes so near the thrust limit that motors will reach theirs: it was
+    rehearsed so, and the position error tells whether it goes well."""
     monitors: tuple[Monitor, ...]
     gate: GateLimits
 
@@ -56,7 +64,9 @@ class FlightSetup:
         """Derive paths, monitors and gate."""
         paths = tuple(pressed_down(g.trajectory) if g.kind is LegKind.LAND else g.trajectory for g in plan.legs)
         lowest_m = min(float(g.trajectory.waypoints()[:, 2].min()) for g in plan.legs)
-        return FlightSetup(plan, vehicle, limits, law, paths, lowest_m, monitors(limits), GateLimits.of(vehicle))
+        gate = GateLimits.of(vehicle)
+        saturating = tuple(_peak_thrust_N(g.trajectory, vehicle) > SPARE_SHARE * gate.thrust_N for g in plan.legs)
+        return FlightSetup(plan, vehicle, limits, law, paths, lowest_m, saturating, monitors(limits), gate)
 
     @property
     def ground_z_m(self) -> float:
@@ -69,50 +79,8 @@ class FlightSetup:
         return min(self.ground_z_m, self.limits.geofence.low_m[2])
 
 
-@dataclass(frozen=True, slots=True)
-class Route:
-    """What is being flown, and how far."""
-
-    leg: int = -1
-    """Index into the plan's legs; -1 before take-off."""
-    leg_time_s: float = 0.0
-    """Along the leg; stands still while a manoeuvre is flown."""
-    path: Trajectory | None = None
-    """The leg's, or a manoeuvre's."""
-    path_time_s: float = 0.0
-    on_leg: bool = False
-    """Whether the path is the leg's own."""
-    calm_s: float = 0.0
-    """For how long the vehicle has stood still at the reference."""
-    grounded_s: float = 0.0
-    """For how long it has stood still although its thrust does not carry it."""
-    stuck_s: float = 0.0
-    """For how long it has stood on the ground although its reference is well above."""
-    sink_speed: float = 0.0
-    """m/s downwards, the highest of late."""
-    v_smooth_W: Vector3 = (0.0, 0.0, 0.0)
-    """m/s, velocity with noise averaged out."""
-
-
-@dataclass(frozen=True, slots=True)
-class Memory:
-    """What one tick hands to the next. The default is a flight that has not begun."""
-
-    phase: Phase = Phase.IDLE
-    phase_since_ns: int = 0
-    now_ns: int | None = None
-    """When the tick before began."""
-    state: State | None = None
-    """Newest known or predicted."""
-    setpoint: AttitudeThrust | None = None
-    """The newest that the control law gave."""
-    integral: Vector3 = (0.0, 0.0, 0.0)
-    invalid_commands: int = 0
-    """Control steps in a row that were not finite."""
-    saturated: bool = False
-    hover_N: float | None = None
-    """Thrust at which this flight hovers, as seen so far; None before the first hold."""
-    blind_s: float = 0.0
-    """Time given to a descent without pose."""
-    route: Route = field(default_factory=Route)
-    safety: SafetyMemory = field(default_factory=SafetyMemory)
+def _peak_thrust_N(trajectory: Trajectory, vehicle: Vehicle) -> float:
+    """Largest thrust that a trajectory takes by itself, m |a + g e3|, sampled at 100 Hz."""
+    times_s = np.linspace(0.0, trajectory.duration_s, math.ceil(100.0 * trajectory.duration_s) + 1)
+    acceleration = trajectory.derivative(times_s, 2)[:, :3] + (0.0, 0.0, GRAVITY_M_PER_S2)
+    return vehicle.mass_kg * float(np.linalg.norm(acceleration, axis=1).max())

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from lcd_flight.flight.manoeuvres import blind_setpoint
-from lcd_flight.flight.setup import FlightSetup, Memory
+from lcd_flight.flight.memory import Memory
+from lcd_flight.flight.setup import FlightSetup
 from lcd_flight.model import AttitudeThrust, Finding, Phase, Reference, Severity, State, TickInputs, Vector3
 from lcd_flight.model.frames import from_yaw, yaw_of
 from lcd_flight.safety.gate import gate

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import math
 
+from lcd_flight.flight.contact import FALLEN, HARD_LANDING, LYING, felt, ground_contact
 from lcd_flight.flight.estimate import estimate, hover_thrust_N
 from lcd_flight.flight.manoeuvres import blind_time_s
+from lcd_flight.flight.memory import Contact, Memory, Route
 from lcd_flight.flight.phases import OF_COMMAND, OF_SEVERITY, TIME_LIMITS_S, Event, advance
-from lcd_flight.flight.route import FALLEN, HARD_LANDING, LYING, begun, ground_contact, moved_on, next_leg
-from lcd_flight.flight.setup import FlightSetup, Memory, Route
+from lcd_flight.flight.route import begun, calmed, moved_on, next_leg, reference_at
+from lcd_flight.flight.setup import FlightSetup
 from lcd_flight.flight.steering import Steering, saturated, steer
 from lcd_flight.model import (
     Command,
@@ -54,17 +56,20 @@ def tick(inputs: TickInputs, setup: FlightSetup, memory: Memory) -> tuple[Tick, 
     """Decide one control step. Equal arguments give equal results, to the bit."""
     dt_s = _step_s(inputs, memory)
     state, safety = estimate(inputs, setup, memory, dt_s)
-    route, reference = moved_on(memory, setup, state, dt_s)
+    route = moved_on(memory.route, dt_s)
+    reference = reference_at(route)
+    contact = felt(memory, setup, state, reference, dt_s)
+    route = calmed(route, state, reference, contact.still, dt_s)
     judged, safety = _judged(inputs, setup, memory, safety, state, reference)
     leg_event, on_leg = next_leg(route, setup, memory.phase)
-    ground_event, on_ground = ground_contact(route, memory.phase, state)
+    ground_event, on_ground = ground_contact(contact, memory.phase, state)
     findings = (*judged, *on_leg, *on_ground, *_orders(inputs), *_expiry(inputs, memory))
     events = [*_events(inputs, findings), *(e for e in (leg_event, ground_event) if e is not None)]
     phase = advance(memory.phase, events)
     known = state or memory.state
     if known is not None and (phase is not memory.phase or leg_event is not None):
         route = begun(route, setup, memory.phase, phase, known)
-        reference = None if route.path is None else route.path.reference(route.path_time_s)
+        reference = reference_at(route)
     steering = steer(phase, state, reference, setup, memory, dt_s)
     limited = saturated(steering.setpoint, inputs, setup)
     decided = Tick(
@@ -81,7 +86,7 @@ def tick(inputs: TickInputs, setup: FlightSetup, memory: Memory) -> tuple[Tick, 
         saturated=limited,
         findings=(*findings, *steering.findings),
     )
-    return decided, _remembered(decided, memory, known, route, safety, steering, setup)
+    return decided, _remembered(decided, memory, known, route, contact, safety, steering, setup)
 
 
 def _step_s(inputs: TickInputs, memory: Memory) -> float:
@@ -106,7 +111,7 @@ def _judged(
         scope=_scope(memory.phase),
         state=state,
         position_error_m=None if error_W is None else math.hypot(*error_W),
-        saturated=memory.saturated,
+        saturated=memory.saturated and not (memory.route.on_leg and setup.foreseen_saturation[memory.route.leg]),
         invalid_commands=memory.invalid_commands,
     )
     return judge(setup.monitors, evidence, safety)
@@ -167,6 +172,7 @@ def _remembered(
     memory: Memory,
     state: State | None,
     route: Route,
+    contact: Contact,
     safety: SafetyMemory,
     steering: Steering,
     setup: FlightSetup,
@@ -187,5 +193,6 @@ def _remembered(
         hover_N=hover_thrust_N(memory, decided.setpoint, state, decided.reference, setup.vehicle, decided.dt_s),
         blind_s=blind_s,
         route=route,
+        contact=contact,
         safety=safety,
     )

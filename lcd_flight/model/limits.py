@@ -22,7 +22,7 @@ class Geofence:
 
 @dataclass(frozen=True, slots=True)
 class SafetyLimits:
-    """What the monitors compare with; defaults from `facts/safety.md`'s table."""
+    """What the monitors compare with."""
 
     geofence: Geofence
     max_position_error_m: float = 1.5

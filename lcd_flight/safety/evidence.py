@@ -68,7 +68,7 @@ class Evidence:
     """Measured, or predicted over a gap."""
     position_error_m: float | None
     saturation_share: float
-    """Of the ticks of the last 0.5 s."""
+    """Of the ticks of the last 0.5 s, where the plan did not foresee it."""
     invalid_commands: int
     """Control steps in a row, up to the tick before, whose result was not finite."""
 
@@ -105,7 +105,7 @@ def gather(
 ) -> tuple[Evidence, SafetyMemory]:
     """The evidence of one tick and the memory that goes with it.
 
-    memory: from `pose_seen`. saturated: whether the setpoint before this tick was at a limit.
+    memory: from `pose_seen`. saturated: whether the setpoint before this tick was at a limit unforeseen by the plan.
     """
     slots = inputs.missed + 1
     saturation = _pushed(memory.saturated, saturated, slots, SATURATION_TICKS)

@@ -171,7 +171,7 @@ def _tracking(limits: SafetyLimits) -> tuple[Monitor, ...]:
         Monitor("position_lost", error, lambda e: e.position_error_m, land_m, Severity.LAND, text),
         Monitor(
             "saturation",
-            "ticks of the last 0.5 s with a motor or the thrust at its limit",
+            "ticks of the last 0.5 s with a motor or the thrust at its limit, on legs whose plan leaves some to spare",
             lambda e: e.saturation_share,
             0.5,
             Severity.BRAKE,

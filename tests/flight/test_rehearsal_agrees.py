@@ -16,7 +16,7 @@ from flight_bench import ORDERS, START_NS, TICK_NS, healthy
 from short_mission import fly, mission, plan, setup, vehicle
 
 from lcd_flight import plugins
-from lcd_flight.flight.setup import Memory
+from lcd_flight.flight.memory import Memory
 from lcd_flight.flight.tick import tick
 from lcd_flight.model import FloatArray, Phase, RolloutOptions, SeedArray, State, Tick, Trajectories
 from lcd_flight.rehearsal.faults import noise_seeds

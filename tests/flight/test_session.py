@@ -13,11 +13,12 @@ from short_mission import Listener, fly, mission, plan, setup, vehicle
 
 from lcd_flight.flight import loop as loop_module
 from lcd_flight.flight import session, virtual_time
+from lcd_flight.flight.memory import Memory
 from lcd_flight.flight.operator import Operator
 from lcd_flight.flight.progress import Checked, Connected, Flying
 from lcd_flight.flight.replay import differences
 from lcd_flight.flight.session import FlightOptions
-from lcd_flight.flight.setup import FlightSetup, Memory
+from lcd_flight.flight.setup import FlightSetup
 from lcd_flight.flight.tick import tick
 from lcd_flight.model import InputError, MotorRequest, Outcome, Phase, RefusedError, Severity, Tick, TickInputs
 

@@ -12,8 +12,8 @@ from flight_bench import TICK_NS, Flight, fly, healthy, setup, with_link, with_t
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lcd_flight.flight.memory import Memory
 from lcd_flight.flight.replay import differences
-from lcd_flight.flight.setup import Memory
 from lcd_flight.flight.tick import tick
 from lcd_flight.model import Command, MotorRequest, Phase, State, TickInputs
 from lcd_flight.model.frames import IDENTITY, tilt_of

@@ -7,7 +7,7 @@ import pytest
 from flight_bench import START_NS, TICK_NS, fly, healthy, setup, without_pose
 
 from lcd_flight.flight.estimate import HOVER_SHARES, estimate, hover_thrust_N, predicted
-from lcd_flight.flight.setup import Memory
+from lcd_flight.flight.memory import Memory
 from lcd_flight.model import AttitudeThrust, Phase, Reference, State
 from lcd_flight.model.frames import IDENTITY, multiply
 

@@ -13,6 +13,7 @@ from flight_bench import (
     ORDERS,
     START_NS,
     TICK_NS,
+    WAYPOINTS,
     Fault,
     Flight,
     codes,
@@ -28,7 +29,8 @@ from flight_bench import (
     without_pose,
 )
 
-from lcd_flight.flight.setup import FlightSetup, Memory
+from lcd_flight.flight.memory import Memory
+from lcd_flight.flight.setup import FlightSetup
 from lcd_flight.flight.tick import MAX_STEP_S, tick
 from lcd_flight.model import (
     AttitudeThrust,
@@ -36,6 +38,7 @@ from lcd_flight.model import (
     Finding,
     FlightPlan,
     Geofence,
+    Leg,
     LegKind,
     MotorRequest,
     Phase,
@@ -43,10 +46,12 @@ from lcd_flight.model import (
     SafetyLimits,
     State,
     TickInputs,
+    Trajectory,
     Vector3,
     Vehicle,
 )
 from lcd_flight.model.frames import IDENTITY, tilt_of
+from lcd_flight.planning.minimum_snap import minimum_snap
 
 UP = [Phase.PREFLIGHT, Phase.READY, Phase.ARMED, Phase.TAKEOFF, Phase.HOLD, Phase.TRACK]
 TRACKING = 420
@@ -186,6 +191,10 @@ class TestPose:
         assert first(flight, Phase.BRAKE_HOLD) == TRACKING + 100
 
 
+def replace_leg(leg: Leg, trajectory: Trajectory) -> Leg:
+    return replace(leg, trajectory=trajectory) if leg.kind is LegKind.TRAJECTORY else leg
+
+
 def fallen(start: int) -> Callable[[TickInputs], TickInputs]:
     """Free fall from 0.8 m, from that tick on."""
 
@@ -253,6 +262,13 @@ class TestTracking:
         flight = fly(fault=full)
         assert first(flight, Phase.BRAKE_HOLD) == TRACKING + 26
         assert flight[TRACKING + 3][1].saturated
+
+    def test_saturation_that_the_plan_itself_asks_for_is_left_to_the_position_error(self) -> None:
+        fast = [replace_leg(leg, minimum_snap(WAYPOINTS, np.array([0.6, 0.6]))) for leg in plan().legs]
+        flown = FlightSetup.of(FlightPlan(tuple(fast)), setup().vehicle, LIMITS)
+        assert flown.foreseen_saturation == (False, False, False, True, False, False)
+        full = from_tick(TRACKING - 70, lambda i: with_telemetry(i, motor_shares=(0.4, 1.0, 0.4, 0.4)), 60)
+        assert "saturation" not in codes(fly(flown, full, ticks=480))
 
     def test_saturation_for_a_moment_does_not(self) -> None:
         full = from_tick(TRACKING, lambda i: with_telemetry(i, motor_shares=(0.4, 1.0, 0.4, 0.4)), 25)
@@ -534,7 +550,7 @@ class TestRoute:
     def test_a_vehicle_that_falls_at_the_end_of_its_landing_has_crashed(self) -> None:
         flight = fly(orders={TRACKING: (Command.LAND,)}, fault=from_tick(TRACKING + 215, fallen(TRACKING + 215)))
         assert phases(flight) == [*UP, Phase.LAND_NOW, Phase.CRASHED]
-        assert finding(flight, "hard_landing")[1].message == "hit the ground at 3.9 m/s"
+        assert finding(flight, "hard_landing")[1].message == "hit the ground at 3.7 m/s"
 
     def test_a_vehicle_that_is_on_the_ground_unseen_has_fallen(self) -> None:
         """The pose is away while it falls: the landing goes on from where it is believed to be."""

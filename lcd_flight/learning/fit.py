@@ -6,9 +6,12 @@ the other.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
+from threading import Lock
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -45,23 +48,47 @@ class FitSettings:
 def fit(data: TrainingSet, settings: FitSettings, members: int, seed: int, report: Report) -> Network:
     """Train `members` networks on the training tasks of `data`, each with a start and an order of its own.
 
+    Side by side, one core each: small networks gain little from sharing one.
+
     Raises:
         InputError: torch is not installed.
     """
-    trained = [_fit_member(data, settings, seed * 1000 + member, report) for member in range(members)]
-    layers = [[layer for layer in model if hasattr(layer, "weight")] for model in trained]
+    torch = require_torch()
+    torch.set_num_threads(max(1, (os.cpu_count() or 1) // members))
+    models = [_network(data, settings, seed * 1000 + member) for member in range(members)]
+    crew = _Crew(report)
+    with ThreadPoolExecutor(members) as pool:
+        work = [pool.submit(_train, m, data, settings, seed * 1000 + i, crew) for i, m in enumerate(models)]
+        try:
+            for member in work:
+                member.result()
+        except BaseException:
+            crew.stop = True
+            raise
+    layers = [[layer for layer in model if hasattr(layer, "weight")] for model in models]
     weights = [np.stack([one.weight.detach().numpy().T for one in same]) for same in zip(*layers, strict=True)]
     biases = [np.stack([one.bias.detach().numpy() for one in same]) for same in zip(*layers, strict=True)]
     return Network.of(weights, biases, settings.activation)
 
 
-def _fit_member(data: TrainingSet, settings: FitSettings, seed: int, report: Report) -> Any:
+class _Crew:
+    """What members that are trained side by side share: one report, and the word to stop."""
+
+    def __init__(self, report: Report) -> None:
+        self.stop = False
+        self._report = report
+        self._lock = Lock()
+
+    def learned(self, rollouts: int) -> None:
+        """Tell the caller, one member at a time."""
+        with self._lock:
+            self._report(rollouts)
+
+
+def _train(model: Any, data: TrainingSet, settings: FitSettings, seed: int, crew: _Crew) -> None:
+    """Train one member."""
     torch = require_torch()
-    torch.manual_seed(seed)
     rows = data.rows(training=True)
-    model = _network(3 * data.features.shape[2] + 2, settings)
-    with torch.no_grad():
-        model[-1].bias.fill_(float(data.segment[rows][data.kept[rows]].mean()))
     optimiser = torch.optim.AdamW(model.parameters(), settings.learning_rate, weight_decay=settings.weight_decay)
     steps = settings.epochs * -(-len(rows) // settings.batch)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, settings.learning_rate, total_steps=steps)
@@ -71,19 +98,25 @@ def _fit_member(data: TrainingSet, settings: FitSettings, seed: int, report: Rep
         torch.nn.utils.clip_grad_norm_(model.parameters(), settings.gradient_clip)
         optimiser.step()
         schedule.step()
-        report(len(chosen))
-    return model
+        crew.learned(len(chosen))
+        if crew.stop:
+            return
 
 
-def _network(inputs: int, settings: FitSettings) -> Any:
-    """Linear layers with the activation between them; one output."""
+def _network(data: TrainingSet, settings: FitSettings, seed: int) -> Any:
+    """Linear layers with the activation between them; one output, which begins near the mean of the targets."""
     torch = require_torch()
+    torch.manual_seed(seed)
     activation = {"silu": torch.nn.SiLU, "elu": torch.nn.ELU, "relu": torch.nn.ReLU}[settings.activation]
-    widths = [inputs, *settings.hidden, 1]
+    widths = [3 * data.features.shape[2] + 2, *settings.hidden, 1]
     layers: list[Any] = []
     for before, after in pairwise(widths):
         layers += [torch.nn.Linear(before, after), activation()]
-    return torch.nn.Sequential(*layers[:-1])
+    model = torch.nn.Sequential(*layers[:-1])
+    rows = data.rows(training=True)
+    with torch.no_grad():
+        model[-1].bias.fill_(float(data.segment[rows][data.kept[rows]].mean()))
+    return model
 
 
 def _batches(rows: IntArray, settings: FitSettings, generator: np.random.Generator) -> Iterator[IntArray]:
@@ -97,7 +130,7 @@ def _batches(rows: IntArray, settings: FitSettings, generator: np.random.Generat
 def _loss(model: Any, data: TrainingSet, rows: IntArray, settings: FitSettings) -> Tensor:
     """Huber loss of the chosen rollouts."""
     torch = require_torch()
-    predicted = model(_windows(torch.from_numpy(data.features[rows]).float()))[..., 0]
+    predicted = model(windows_of(torch.from_numpy(data.features[rows]).float()))[..., 0]
     if settings.loss == "segment":
         kept = torch.from_numpy(data.kept[rows])
         predicted, wanted = predicted[kept], torch.from_numpy(data.segment[rows])[kept]
@@ -107,7 +140,7 @@ def _loss(model: Any, data: TrainingSet, rows: IntArray, settings: FitSettings) 
     return torch.nn.functional.huber_loss(predicted, wanted, delta=settings.huber_delta)
 
 
-def _windows(features: Tensor) -> Tensor:
+def windows_of(features: Tensor) -> Tensor:
     """(B, S, F) to (B, S, 3 F + 2), as `planning.cost.tracking_cost.windows`."""
     torch = require_torch()
     rollouts, segments, width = features.shape

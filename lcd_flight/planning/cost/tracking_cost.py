@@ -31,8 +31,8 @@ _BATCH_WINDOWS = 512
 _STD_FLOOR_SQUARED = 1e-12
 """Below the root of the variance over members, so that its gradient exists where they agree."""
 
-_RANGE_MARGIN = 1e-6
-"""Of the training range, for rounding."""
+_RANGE_MARGIN = 0.01
+"""Share of its span that the training range is widened by at either end: features are stored in half precision."""
 
 
 def windows(normalised: Array) -> Array:
@@ -174,4 +174,5 @@ def training_range(features: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
     rows = features.reshape(-1, features.shape[-1])
     low, high = np.quantile(rows, [0.0001, 0.9999], axis=0)
-    return low - _RANGE_MARGIN, high + _RANGE_MARGIN
+    margin = _RANGE_MARGIN * (high - low) + 1e-6
+    return low - margin, high + margin

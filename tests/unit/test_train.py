@@ -1,0 +1,161 @@
+"""Training from nothing, small: it learns, says so on its card, goes on where it stopped, refuses what does not fit."""
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from lcd_flight.learning import train as train_module
+from lcd_flight.learning.collect import Mix
+from lcd_flight.learning.evaluate import EvaluationOptions, evaluate
+from lcd_flight.learning.fit import FitSettings, windows_of
+from lcd_flight.learning.policy import PolicyConfig, collect_policy, policy_plans
+from lcd_flight.learning.recipes import RECIPES, TrainConfig
+from lcd_flight.learning.rollouts import Source
+from lcd_flight.learning.train import train
+from lcd_flight.learning.training_set import trains
+from lcd_flight.model import InputError
+from lcd_flight.planning.cost.model_file import check_fits, load_model
+from lcd_flight.planning.cost.tracking_cost import windows
+from lcd_flight.plugins import simulator
+from lcd_flight.worlds import fingerprint, load_world
+
+WORLD = load_world("crazyflie-saturated")
+TINY = TrainConfig(
+    "tiny",
+    (WORLD,),
+    count=12_000,
+    rounds=1,
+    policy_tasks=40,
+    members=2,
+    mix=Mix(search_tasks=50, search_population=8, search_generations=4, random_tasks=590, random_draws=3),
+    fit=FitSettings(hidden=(32, 16), epochs=12, batch=256),
+)
+
+
+@pytest.fixture(scope="module")
+def sim():
+    return simulator("multirotor")
+
+
+@pytest.fixture(scope="module")
+def trained(sim, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("training")
+    seen = []
+    train(TINY, folder / "work", folder / "tiny.safetensors", sim, seen.append)
+    return folder, seen
+
+
+def test_it_beats_the_mean_on_tasks_that_it_never_saw(trained):
+    figures = load_model(trained[0] / "tiny.safetensors").card.validation
+    assert figures["huber"] < 0.6 * figures["huber_of_mean"]
+    assert figures["correlation"] > 0.6
+
+
+def test_what_was_measured_rises_with_what_was_predicted(trained):
+    figures = load_model(trained[0] / "tiny.safetensors").card.validation
+    medians = [figures[f"median_m_at_{edge}_m"] for edge in ("0.3", "0.5", "1") if f"median_m_at_{edge}_m" in figures]
+    assert len(medians) >= 2
+    assert medians == sorted(medians)
+
+
+def test_the_card_says_what_it_is_good_for(trained):
+    model = load_model(trained[0] / "tiny.safetensors")
+    card = model.card
+    assert card.name == "tiny"
+    assert card.worlds == ("crazyflie-saturated v1",)
+    assert card.rollouts == 12_000 + 40 * 16
+    assert card.parasitic_drag == WORLD.drag_configurations
+    assert {"torch", "lcd-flight"} <= set(card.versions)
+    assert model.network.members == 2
+    check_fits(model, fingerprint(WORLD.base_vehicle, "paper"), "paper")
+    with pytest.raises(InputError, match="flight loop"):
+        check_fits(model, fingerprint(WORLD.base_vehicle, "paper"), "flight")
+
+
+def test_progress_names_every_stage(trained):
+    assert {p.unit for p in trained[1]} == {"rollouts", "rollouts loaded", "rollouts learned", "tasks"}
+    assert all(p.done <= p.total for p in trained[1])
+
+
+def test_it_is_evaluated_like_any_other_method(trained, sim):
+    options = EvaluationOptions(seed=3, model=str(trained[0] / "tiny.safetensors"))
+    found = evaluate(WORLD, ["minimum-snap", "learned"], 60, sim, options).methods
+    assert found["learned"].crash_rate < found["minimum-snap"].crash_rate
+    assert found["learned"].tasks == 60
+
+
+def test_a_second_run_does_nothing_and_gives_the_same_file(trained, sim, monkeypatch):
+    folder, _ = trained
+    monkeypatch.setattr(train_module, "fit", None)
+    train(TINY, folder / "work", folder / "again.safetensors", sim)
+    assert (folder / "again.safetensors").read_bytes() == (folder / "tiny.safetensors").read_bytes()
+
+
+def test_a_lost_round_is_trained_again_to_the_same_file(trained, sim):
+    folder, _ = trained
+    (folder / "work" / "round-1.safetensors").unlink()
+    train(TINY, folder / "work", folder / "again.safetensors", sim)
+    assert (folder / "again.safetensors").read_bytes() == (folder / "tiny.safetensors").read_bytes()
+
+
+def test_a_work_folder_of_another_training_is_refused(trained, sim):
+    folder, _ = trained
+    with pytest.raises(InputError, match=r"round-0\.safetensors: made by another configuration"):
+        train(replace(TINY, members=1), folder / "work", folder / "no.safetensors", sim)
+    with pytest.raises(InputError, match=r"shard-00000\.parquet: made by another configuration \(seed: 9, there 0\)"):
+        train(replace(TINY, seed=9), folder / "work", folder / "no.safetensors", sim)
+
+
+def test_policy_rows_are_the_plan_and_jitter_around_it(trained, sim, tmp_path):
+    path = trained[0] / "work" / "round-0.safetensors"
+    config = PolicyConfig(TINY.collecting(WORLD), 1, "a hash", 0.1)
+    task = config.tasks(0, 6)
+    plans = policy_plans(config, load_model(path), task)
+    z, theta = plans.z.reshape(6, 16, -1), plans.theta.reshape(6, 16, -1)
+    assert set(plans.source) == {Source.POLICY}
+    assert np.array_equal(plans.task, np.repeat(task, 16))
+    assert np.abs(z[:, 0]).max() > 0.05
+    assert np.all(np.linalg.norm(z[:, 1:] - z[:, :1], axis=2) > 0.0)
+    fixed = ~theta.reshape(6, -1).any(axis=1)
+    assert 0 < fixed.sum() < 6
+    assert np.all(np.abs(theta[~fixed][:, 1:] - theta[~fixed][:, :1]).max(axis=2) > 0.0)
+    alone = policy_plans(config, load_model(path), task[4:5])
+    assert np.allclose(alone.z, plans.z[64:80], atol=1e-5)
+    made = collect_policy(config, path, 6, tmp_path, sim)
+    assert len(made.read(0)) == 96
+    assert task.min() > 1 << 32
+
+
+def test_the_split_is_by_task():
+    task = np.repeat(np.arange(2_000), 3)
+    split = trains(0, task)
+    assert np.array_equal(split[0::3], split[2::3])
+    assert split.mean() == pytest.approx(0.8, abs=0.03)
+
+
+@pytest.mark.parametrize("segments", [1, 2, 5])
+def test_windows_are_those_of_planning(segments):
+    features = np.random.default_rng(0).normal(size=(4, segments, 7)).astype(np.float32)
+    assert np.array_equal(windows_of(torch.from_numpy(features)).numpy(), windows(features))
+
+
+def test_one_network_serves_one_vehicle_and_one_loop():
+    with pytest.raises(InputError, match="not of one vehicle, one loop"):
+        TrainConfig("both", (WORLD, load_world("hummingbird-paper")))
+    with pytest.raises(InputError, match="at least one world"):
+        TrainConfig("none", ())
+
+
+def test_the_recipes_are_as_large_as_they_say():
+    worlds = (WORLD, load_world("crazyflie-paper"))
+    assert RECIPES["small"]("m", worlds).capacity == pytest.approx(1.0e6, rel=0.05)
+    assert RECIPES["full"]("m", worlds).capacity == pytest.approx(3.8e6, rel=0.05)
+
+
+def test_a_missing_extra_is_one_clear_line(monkeypatch, sim, tmp_path):
+    monkeypatch.setitem(sys.modules, "torch", None)
+    with pytest.raises(InputError, match=r"this needs torch.*pip install 'lcd-flight\[train\]'"):
+        train(TINY, tmp_path, tmp_path / "m.safetensors", sim)

@@ -52,6 +52,21 @@ def test_noise_has_rotorpys_effect() -> None:
     assert spread[0] == pytest.approx(spread[1], rel=0.35)
 
 
+def test_motor_noise_is_white_and_each_rotors_own() -> None:
+    """What is left of the rotor speeds when lag and command are taken out: sigma once a tick, nothing correlated."""
+    vehicle = load_vehicle("crazyflie")
+    flight = trace(Trajectory.hover((0.0, 0.0, 1.0), 0.0, 60.0), vehicle, 3, PAPER)
+    lag = np.exp(-0.01 / vehicle.motor_time_constant_s)
+    commanded = flight.rotor_commands[1:]
+    noise = flight.rotor_speeds[1:] - commanded - lag * (flight.rotor_speeds[:-1] - commanded)
+    count = len(noise)
+    assert flight.clipped.max() == 0.0
+    assert noise.mean(axis=0) == pytest.approx(0.0, abs=4.0 * vehicle.motor_noise / np.sqrt(count))
+    assert noise.std(axis=0) == pytest.approx(vehicle.motor_noise, rel=0.05)
+    later = np.corrcoef(np.hstack([noise[1:], noise[:-1]]).T)
+    assert np.abs(later - np.eye(8)).max() < 4.5 / np.sqrt(count)
+
+
 @pytest.mark.parametrize(
     ("world", "known", "known_error"),
     [("crazyflie-saturated", 39.9, 1.5), ("crazyflie-paper", 8.7, 0.9), ("hummingbird-paper", 45.4, 1.5)],

@@ -47,7 +47,7 @@ def collect(
 def train(
     worlds: Annotated[str, typer.Option(help="Names, separated by commas: of one vehicle and one loop.")],
     out: Annotated[Path, typer.Option(help="The model file to write, *.safetensors.")],
-    recipe: Annotated[str, typer.Option(help="small (about a million labels) or full (about four).")] = "full",
+    recipe: Annotated[str, typer.Option(help="small, medium or full: about one, two or four million labels.")] = "full",
     work: Annotated[Path | None, typer.Option(help="Folder for data and the models of the rounds.")] = None,
     seed: Seed = 0,
     json: Json = False,

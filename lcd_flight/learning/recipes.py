@@ -1,4 +1,4 @@
-"""What a model is made from: worlds, data, rounds and networks; and two recipes that are known to work."""
+"""What a model is made from: worlds, data, rounds and networks; and recipes that are known to work."""
 
 from __future__ import annotations
 
@@ -69,9 +69,14 @@ def small_recipe(name: str, worlds: tuple[World, ...], seed: int = 0) -> TrainCo
     return TrainConfig(name, worlds, seed)
 
 
+def medium_recipe(name: str, worlds: tuple[World, ...], seed: int = 0) -> TrainConfig:
+    """About two million labels and two networks."""
+    return TrainConfig(name, worlds, seed, count=1_500_000, rounds=2, policy_tasks=12_000, members=2)
+
+
 def full_recipe(name: str, worlds: tuple[World, ...], seed: int = 0) -> TrainConfig:
     """About four million labels and two networks; what the shipped models are made by."""
     return TrainConfig(name, worlds, seed, count=2_600_000, rounds=3, policy_tasks=25_500, members=2)
 
 
-RECIPES = {"small": small_recipe, "full": full_recipe}
+RECIPES = {"small": small_recipe, "medium": medium_recipe, "full": full_recipe}

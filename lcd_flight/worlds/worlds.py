@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -48,13 +49,29 @@ def world_names() -> list[str]:
 
 @cache
 def load_world(name: str) -> World:
-    """A world by name.
+    """A world by name; `NAME@SPEED` is the same world at another mean speed in m/s, e.g. `crazyflie-flight@1.5`.
 
     Raises:
-        InputError: there is none of this name.
+        InputError: there is none of this name, or the speed is not a positive number.
     """
-    if name not in world_names():
+    base, at, speed = name.partition("@")
+    if base not in world_names():
         raise InputError(f"world {name!r} is not known; worlds: {', '.join(world_names())}")
+    world = _shipped_world(base)
+    return replace(world, name=name, speed=_speed(name, speed)) if at else world
+
+
+def _speed(name: str, text: str) -> float:
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = math.nan
+    if not 0.0 < speed < math.inf:
+        raise InputError(f"world {name!r}: {text!r} is no speed; write a positive number of m/s after the @")
+    return speed
+
+
+def _shipped_world(name: str) -> World:
     data = read(_DATA / f"{name}.yaml", WorldData)
     vehicle = replace(
         load_vehicle(data.vehicle),

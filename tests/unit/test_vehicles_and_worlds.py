@@ -189,3 +189,14 @@ def test_a_fingerprint_binds_what_the_loop_flies_and_nothing_else() -> None:
     assert fingerprint(replace(v, flight_gains=slower), "flight") != flight
     assert fingerprint(replace(v, flight_gains=slower), "paper") == paper
     assert fingerprint(replace(v, onboard=None), "flight") != flight
+
+
+def test_a_world_can_be_had_at_another_speed() -> None:
+    slow, base = load_world("crazyflie-flight@1.5"), load_world("crazyflie-flight")
+    assert slow == replace(base, name="crazyflie-flight@1.5", speed=1.5)
+
+
+@pytest.mark.parametrize("speed", ["", "fast", "0", "-1", "nan", "inf"])
+def test_a_speed_that_is_none_is_refused(speed: str) -> None:
+    with pytest.raises(InputError, match="is no speed"):
+        load_world(f"crazyflie-flight@{speed}")

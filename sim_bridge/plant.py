@@ -13,7 +13,7 @@ from sim_bridge.battery import Battery
 from sim_bridge.compiled import plant_kernel
 from sim_bridge.craft import craft_of
 from sim_bridge.kernels import rows
-from sim_bridge.kernels.lane import MAX_RATE, MAX_SPEED
+from sim_bridge.kernels.judge import MAX_RATE, MAX_SPEED
 from sim_bridge.kernels.multirotor import Motion
 from sim_bridge.kernels.onboard import received, roll_pitch_yaw
 from sim_bridge.kernels.plant import IMPACT_SPEED, IMPACT_UPRIGHT

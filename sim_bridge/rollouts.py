@@ -65,7 +65,7 @@ def _over_blocks(blocks: int, threads: int, arguments: tuple[Any, ...]) -> None:
         try:
             for done in work:
                 done.result()
-        except BaseException:
+        except BaseException:  # above all KeyboardInterrupt: what has not begun is not flown any more
             pool.shutdown(wait=True, cancel_futures=True)
             raise
 

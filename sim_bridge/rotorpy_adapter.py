@@ -13,7 +13,8 @@ from rotorpy.controllers.quadrotor_control import SE3Control
 from rotorpy.vehicles.multirotor import Multirotor
 
 from lcd_flight.model import FloatArray, Trajectory, Vehicle
-from sim_bridge.kernels.lane import MAX_RATE, MAX_SPEED, TICK_S
+from sim_bridge.kernels.judge import MAX_RATE, MAX_SPEED
+from sim_bridge.kernels.lane import TICK_S
 
 GAINS = ((6.5, 6.5, 15.0), (4.0, 4.0, 9.0))
 """Position and velocity gains, which are constants in its SE3Control."""

@@ -9,7 +9,8 @@ import numpy as np
 from lcd_flight.control.geometric import clipped
 from lcd_flight.model import FloatArray
 from sim_bridge.kernels import rows
-from sim_bridge.kernels.lane import advance, disturb, stabilise
+from sim_bridge.kernels.guidance import stabilise
+from sim_bridge.kernels.lane import advance, disturb
 from sim_bridge.kernels.multirotor import Motion
 from sim_bridge.kernels.noise import key_of
 from sim_bridge.kernels.rollout import Craft

@@ -8,20 +8,9 @@ import numpy as np
 
 from lcd_flight.model import FloatArray, IntArray, SeedArray
 from sim_bridge.kernels import rows
-from sim_bridge.kernels.lane import (
-    TICK_S,
-    Law,
-    advance,
-    command_attitude,
-    command_rotors,
-    count_clips,
-    disturb,
-    judge,
-    look,
-    refer,
-    remember,
-    stabilise,
-)
+from sim_bridge.kernels.guidance import Law, command_attitude, command_rotors, refer, stabilise
+from sim_bridge.kernels.judge import count_clips, judge
+from sim_bridge.kernels.lane import TICK_S, advance, disturb, look, remember
 from sim_bridge.kernels.multirotor import Airframe
 from sim_bridge.kernels.noise import key_of
 from sim_bridge.kernels.onboard import DEGREES, Onboard

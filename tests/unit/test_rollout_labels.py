@@ -9,7 +9,7 @@ from simulator_plans import minimum_snap_plans, seeds
 
 from lcd_flight.model import InputError, Loop, RolloutOptions, Trajectories, Trajectory
 from lcd_flight.worlds import load_vehicle
-from sim_bridge.kernels.lane import MAX_RATE, MAX_SPEED
+from sim_bridge.kernels.judge import MAX_RATE, MAX_SPEED
 from sim_bridge.rollouts import MultirotorSimulator
 from sim_bridge.trace import RolloutTrace, trace
 

@@ -1,0 +1,179 @@
+"""What one vehicle of a batch is told: its reference, the law's command, the onboard controller's; as in `lane`."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from lcd_flight.control.flight_law import integrated, thrust_and_attitude
+from lcd_flight.control.geometric import (
+    Allocation,
+    Row4,
+    acceleration_setpoint,
+    attitude_setpoint,
+    clipped,
+    dot,
+    moment,
+    moment_feed_forward,
+    rotation_of,
+    rotor_speeds,
+    scaled,
+)
+from lcd_flight.model import FloatArray, Vector3
+from sim_bridge.kernels import rows
+from sim_bridge.kernels.elementary import cos_sin
+from sim_bridge.kernels.lane import TICK_S
+from sim_bridge.kernels.multirotor import Airframe
+from sim_bridge.kernels.onboard import (
+    DEGREES,
+    Onboard,
+    PidMemory,
+    Setpoint,
+    cascade,
+    mixed,
+    received,
+    roll_pitch_yaw,
+    speed_of,
+)
+from sim_bridge.kernels.rows import LANES, load3, load4, load_motion, store3, store4
+
+
+class Law(NamedTuple):
+    """What the controller believes of the vehicle and how it is tuned (`model.GeometricGains`)."""
+
+    mass_kg: float
+    inertia_kg_m2: Vector3
+    position_gain: Vector3
+    velocity_gain: Vector3
+    attitude_gain: float
+    rate_gain: float
+    allocation: Allocation
+    feed_forward: bool
+    """Whether the paper's last term, which RotorPy drops, is added to the moment."""
+    integral_gain: Vector3
+    integral_limit: float
+    thrust_limit_N: float
+
+
+class Sample(NamedTuple):
+    """The reference at a tick, as the law needs it."""
+
+    p_W: Vector3
+    v_W: Vector3
+    a_W: Vector3
+    yaw_rad: float
+    yaw_rate: float
+    yaw_acceleration: float
+
+
+def refer(memory: FloatArray, lane: int, tick: float) -> None:
+    """Sample the plan at a tick; after its end, at rest there (plans end at rest)."""
+    time = min(TICK_S * tick, memory[rows.DURATION * LANES + lane]) - memory[rows.SEGMENT_START * LANES + lane]
+    x = horner(memory, rows.COEFFICIENTS, lane, time)
+    y = horner(memory, rows.COEFFICIENTS + 8, lane, time)
+    z = horner(memory, rows.COEFFICIENTS + 16, lane, time)
+    yaw = horner(memory, rows.COEFFICIENTS + 24, lane, time)
+    store3(memory, rows.REFERENCE, lane, (x[0], y[0], z[0]))
+    store3(memory, rows.REFERENCE + 3, lane, (x[1], y[1], z[1]))
+    store3(memory, rows.REFERENCE + 6, lane, (x[2], y[2], z[2]))
+    store3(memory, rows.REFERENCE + 9, lane, yaw)
+
+
+def horner(memory: FloatArray, row: int, lane: int, time: float) -> Vector3:
+    """Value, first and second derivative of the polynomial of order 7 whose coefficients begin at `row`."""
+    value, first, half_second = memory[(row + 7) * LANES + lane], 0.0, 0.0
+    for k in range(6, -1, -1):
+        half_second = half_second * time + first
+        first = first * time + value
+        value = value * time + memory[(row + k) * LANES + lane]
+    return (value, first, 2.0 * half_second)
+
+
+def reference(memory: FloatArray, lane: int) -> Sample:
+    """The plan at this tick."""
+    return Sample(
+        load3(memory, rows.REFERENCE, lane),
+        load3(memory, rows.REFERENCE + 3, lane),
+        load3(memory, rows.REFERENCE + 6, lane),
+        memory[(rows.REFERENCE + 9) * LANES + lane],
+        memory[(rows.REFERENCE + 10) * LANES + lane],
+        memory[(rows.REFERENCE + 11) * LANES + lane],
+    )
+
+
+def command_rotors(memory: FloatArray, lane: int, law: Law, air: Airframe) -> None:
+    """The paper's loop: the law's force and moment straight to rotor speeds."""
+    p, v, q, w = load_motion(memory, rows.SEEN, lane)
+    ref = reference(memory, lane)
+    acceleration = acceleration_setpoint(p, v, ref.p_W, ref.v_W, ref.a_W, law.position_gain, law.velocity_gain)
+    force = scaled(acceleration, law.mass_kg)
+    R_WB = rotation_of(q)
+    R_WD = attitude_setpoint(force, cos_sin(ref.yaw_rad))
+    turn = moment(R_WB, R_WD, w, ref.yaw_rate, law.inertia_kg_m2, law.attitude_gain, law.rate_gain)
+    if law.feed_forward:
+        desired, change = (0.0, 0.0, ref.yaw_rate), (0.0, 0.0, ref.yaw_acceleration)
+        more = moment_feed_forward(R_WB, R_WD, w, desired, change, law.inertia_kg_m2)
+        turn = (turn[0] + more[0], turn[1] + more[1], turn[2] + more[2])
+    wanted = rotor_speeds(dot(force, R_WB[2]), turn, law.allocation)
+    low, high = air.speed_min, air.speed_max
+    given = (
+        clipped(wanted[0], low, high),
+        clipped(wanted[1], low, high),
+        clipped(wanted[2], low, high),
+        clipped(wanted[3], low, high),
+    )
+    store4(memory, rows.COMMANDS, lane, given)
+    memory[rows.CLIPS * LANES + lane] = differing(wanted, given)
+
+
+def command_attitude(memory: FloatArray, lane: int, law: Law, controller: Onboard) -> None:
+    """The flight loop: the law's thrust and attitude as the setpoint of the onboard controller."""
+    p, v, q, _ = load_motion(memory, rows.SEEN, lane)
+    ref = reference(memory, lane)
+    integral = load3(memory, rows.INTEGRAL, lane)
+    acceleration = acceleration_setpoint(p, v, ref.p_W, ref.v_W, ref.a_W, law.position_gain, law.velocity_gain)
+    heading = cos_sin(ref.yaw_rad)
+    thrust_N, R_WD = thrust_and_attitude(acceleration, integral, rotation_of(q)[2], heading, law.mass_kg)
+    dt_s = 0.0 if thrust_N > law.thrust_limit_N else TICK_S
+    error = (p[0] - ref.p_W[0], p[1] - ref.p_W[1], p[2] - ref.p_W[2])
+    store3(memory, rows.INTEGRAL, lane, integrated(integral, error, law.integral_gain, law.integral_limit, dt_s))
+    setpoint = received(thrust_N, R_WD, rotation_of(load4(memory, rows.MOTION + 6, lane)), controller)
+    memory[rows.SETPOINT * LANES + lane] = setpoint.thrust
+    store3(memory, rows.SETPOINT + 1, lane, setpoint.attitude)
+    memory[rows.CLIPS * LANES + lane] = 0.0
+
+
+def stabilise(memory: FloatArray, lane: int, air: Airframe, controller: Onboard) -> None:
+    """One period of the onboard controller: from its setpoint to commanded rotor speeds."""
+    _, _, q, w = load_motion(memory, rows.MOTION, lane)
+    setpoint = Setpoint(memory[rows.SETPOINT * LANES + lane], load3(memory, rows.SETPOINT + 1, lane))
+    before = PidMemory(
+        load3(memory, rows.PID, lane),
+        load3(memory, rows.PID + 3, lane),
+        load3(memory, rows.PID + 6, lane),
+        load3(memory, rows.PID + 9, lane),
+    )
+    outputs, after = cascade(setpoint, roll_pitch_yaw(rotation_of(q)), scaled(w, DEGREES), before, controller)
+    store3(memory, rows.PID, lane, after.attitude_integral)
+    store3(memory, rows.PID + 3, lane, after.rate_integral)
+    store3(memory, rows.PID + 6, lane, after.attitude)
+    store3(memory, rows.PID + 9, lane, after.rates)
+    asked, given = mixed(setpoint.thrust, outputs, controller)
+    low, high = air.speed_min, air.speed_max
+    speeds = (
+        clipped(speed_of(given[0], high), low, high),
+        clipped(speed_of(given[1], high), low, high),
+        clipped(speed_of(given[2], high), low, high),
+        clipped(speed_of(given[3], high), low, high),
+    )
+    store4(memory, rows.COMMANDS, lane, speeds)
+    memory[rows.CLIPS * LANES + lane] += differing(asked, given) * (controller.period_s / TICK_S)
+
+
+def differing(a: Row4, b: Row4) -> float:
+    """How many of the four differ."""
+    return (
+        (1.0 if a[0] != b[0] else 0.0)
+        + (1.0 if a[1] != b[1] else 0.0)
+        + (1.0 if a[2] != b[2] else 0.0)
+        + (1.0 if a[3] != b[3] else 0.0)
+    )

@@ -68,13 +68,25 @@ def blind_setpoint(vehicle: Vehicle, hover_N: float, yaw_rad: float) -> Attitude
     return AttitudeThrust(hover_N - vehicle.mass_kg * BLIND_ACCELERATION, from_yaw(yaw_rad))
 
 
-def blind_time_s(height_m: float, climb_speed: float) -> float:
+def blind_time_s(vehicle: Vehicle, height_m: float, climb_speed: float) -> float:
     """How long a descent without pose from `height_m` above ground is given before the motors stop.
 
-    climb_speed: m/s, positive upwards, when it begins.
+    climb_speed: m/s, positive upwards, when it begins. From rest a descent takes sqrt(2 h / a) as long as drag is
+    nothing, and h / v + v / a once it has its final speed v: sqrt((h / v)^2 + 2 h / a) is both.
     """
-    fall = math.sqrt(climb_speed**2 + 2.0 * BLIND_ACCELERATION * max(height_m, 0.0))
-    return BLIND_MARGIN * max(climb_speed + fall, 0.0) / BLIND_ACCELERATION
+    climb = max(climb_speed, 0.0)
+    top_m = max(height_m, 0.0) + climb**2 / (2.0 * BLIND_ACCELERATION)
+    down_s = math.sqrt((top_m / _final_sink_speed(vehicle)) ** 2 + 2.0 * top_m / BLIND_ACCELERATION)
+    return BLIND_MARGIN * (climb / BLIND_ACCELERATION + down_s)
+
+
+def _final_sink_speed(vehicle: Vehicle) -> float:
+    """m/s at which inflow (4 k_z O v) and drag (c_D v^2) make up for the missing thrust; infinite without either."""
+    missing_N = vehicle.mass_kg * BLIND_ACCELERATION
+    inflow = 4.0 * vehicle.k_z * vehicle.hover_rotor_speed
+    drag = vehicle.parasitic_drag[2]
+    resistance = inflow + math.sqrt(inflow**2 + 4.0 * drag * missing_N)
+    return 2.0 * missing_N / resistance if resistance > 0.0 else math.inf
 
 
 def _braking_s(state: State, change: float, ground_z_m: float) -> float:

@@ -61,8 +61,8 @@ class Memory:
     saturated: bool = False
     hover_N: float | None = None
     """Thrust at which this flight hovers, as seen so far; None before the first hold."""
-    blind_s: float = 0.0
-    """Time given to a descent without pose."""
+    limit_s: float | None = None
+    """How long the phase may last."""
     route: Route = field(default_factory=Route)
     contact: Contact = field(default_factory=Contact)
     safety: SafetyMemory = field(default_factory=SafetyMemory)

@@ -66,10 +66,14 @@ TIME_LIMITS_S: Mapping[Phase, float] = {
     Phase.READY: 30.0,
     Phase.ARMED: 10.0,
     Phase.BRAKE_HOLD: 5.0,
-    Phase.LAND: 60.0,
-    Phase.LAND_NOW: 60.0,
 }
-"""How long a phase may last. DESCEND_BLIND is timed by the height at which it begins (`manoeuvres.blind_time_s`)."""
+"""How long a phase may last, where that does not depend on the flight.
+
+DESCEND_BLIND is timed by the height at which it begins (`manoeuvres.blind_time_s`), LAND and LAND_NOW by their path and
+`LANDING_GRACE_S`.
+"""
+LANDING_GRACE_S = 10.0
+"""After the end of a landing's path; a vehicle that still has not touched down descends level, and its motors stop."""
 
 _ON_GROUND = {
     Event.BRAKE: Phase.IDLE,

@@ -24,7 +24,7 @@ async def descend_and_stop(link: Link, clock: Clock, setup: FlightSetup, memory:
     try:
         if memory.phase.airborne and state is not None:
             setpoint = blind_setpoint(setup.vehicle, memory.hover_N or setup.vehicle.weight_N, yaw_of(state.q_WB))
-            descent_s = blind_time_s(state.p_WB[2] - setup.ground_z_m, state.v_WB_W[2])
+            descent_s = blind_time_s(setup.vehicle, state.p_WB[2] - setup.ground_z_m, state.v_WB_W[2])
             end_ns, keeper = clock.now_ns() + round(descent_s * 1e9), RateKeeper(clock)
             while clock.now_ns() < end_ns:
                 link.send(setpoint, clock.now_ns())

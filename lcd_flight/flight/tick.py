@@ -12,7 +12,7 @@ from lcd_flight.flight.contact import FALLEN, HARD_LANDING, LYING, felt, ground_
 from lcd_flight.flight.estimate import estimate, hover_thrust_N
 from lcd_flight.flight.manoeuvres import blind_time_s
 from lcd_flight.flight.memory import Contact, Memory, Route
-from lcd_flight.flight.phases import OF_COMMAND, OF_SEVERITY, TIME_LIMITS_S, Event, advance
+from lcd_flight.flight.phases import LANDING_GRACE_S, OF_COMMAND, OF_SEVERITY, TIME_LIMITS_S, Event, advance
 from lcd_flight.flight.route import begun, calmed, moved_on, next_leg, reference_at
 from lcd_flight.flight.setup import FlightSetup
 from lcd_flight.flight.steering import Steering, saturated, steer
@@ -129,11 +129,19 @@ def _orders(inputs: TickInputs) -> tuple[Finding, ...]:
 
 def _expiry(inputs: TickInputs, memory: Memory) -> tuple[Finding, ...]:
     """A finding once the phase has lasted as long as it may."""
-    limit_s = memory.blind_s if memory.phase is Phase.DESCEND_BLIND else TIME_LIMITS_S.get(memory.phase)
-    lasted_s = (inputs.now_ns - memory.phase_since_ns) * 1e-9
+    limit_s, lasted_s = memory.limit_s, (inputs.now_ns - memory.phase_since_ns) * 1e-9
     if limit_s is None or lasted_s <= limit_s:
         return ()
     return (Finding(EXPIRED, Severity.WARN, f"{memory.phase} has lasted {limit_s:.1f} s", lasted_s, limit_s),)
+
+
+def _time_limit_s(phase: Phase, route: Route, setup: FlightSetup, state: State | None) -> float | None:
+    """How long a phase that begins now may last; None: for ever."""
+    if phase in (Phase.LAND, Phase.LAND_NOW) and route.path is not None:
+        return route.path.duration_s + LANDING_GRACE_S
+    if phase is Phase.DESCEND_BLIND and state is not None:
+        return blind_time_s(setup.vehicle, state.p_WB[2] - setup.ground_z_m, state.v_WB_W[2])
+    return TIME_LIMITS_S.get(phase)
 
 
 def _events(inputs: TickInputs, findings: tuple[Finding, ...]) -> list[Event]:
@@ -178,9 +186,6 @@ def _remembered(
     setup: FlightSetup,
 ) -> Memory:
     entered = decided.phase is not memory.phase
-    blind_s = memory.blind_s
-    if entered and decided.phase is Phase.DESCEND_BLIND and state is not None:
-        blind_s = blind_time_s(state.p_WB[2] - setup.ground_z_m, state.v_WB_W[2])
     return Memory(
         phase=decided.phase,
         phase_since_ns=decided.now_ns if entered else memory.phase_since_ns,
@@ -191,7 +196,7 @@ def _remembered(
         invalid_commands=steering.invalid_commands,
         saturated=decided.saturated,
         hover_N=hover_thrust_N(memory, decided.setpoint, state, decided.reference, setup.vehicle, decided.dt_s),
-        blind_s=blind_s,
+        limit_s=_time_limit_s(decided.phase, route, setup, state) if entered else memory.limit_s,
         route=route,
         contact=contact,
         safety=safety,

@@ -24,6 +24,7 @@ from flight_bench import (
     phases,
     plan,
     setup,
+    straight,
     with_link,
     with_telemetry,
     without_pose,
@@ -576,6 +577,27 @@ class TestRoute:
         flight = fly(fault=from_tick(TRACKING, tipped))
         assert phases(flight) == [*UP, Phase.LAND, Phase.CRASHED]
         assert "lies_tilted" in codes(flight)
+
+    def test_a_landing_from_high_up_has_the_time_it_takes(self) -> None:
+        high = WAYPOINTS[0] * (1.0, 1.0, 30.0, 1.0)
+        legs = (
+            Leg(LegKind.TAKEOFF, straight([0.0, 0.0, 0.0, 0.0], high.tolist(), 20.0)),
+            Leg(LegKind.LAND, straight(high.tolist(), [0.0, 0.0, 0.0, 0.0], 80.0)),
+        )
+        tall = replace(LIMITS, geofence=Geofence((-2.0, -2.0, 0.0), (3.0, 3.0, 40.0)))
+        flown = FlightSetup.of(FlightPlan(legs), setup().vehicle, tall)
+        assert phases(fly(flown, ticks=12_000))[-2:] == [Phase.LAND, Phase.LANDED]
+        flight = fly(flown, orders={1900: (Command.LAND,)}, ticks=12_000)
+        assert phases(flight)[-2:] == [Phase.LAND_NOW, Phase.LANDED]
+        assert (len(flight) - first(flight, Phase.LAND_NOW)) * 0.01 > 65.0
+
+    def test_a_landing_that_finds_no_ground_ends_level_and_is_stopped(self) -> None:
+        def hovers(inputs: TickInputs) -> TickInputs:
+            state = State((0.5, 1.0, 0.4), (0.0, 0.0, -0.2), IDENTITY, (0.0, 0.0, 0.0))
+            return replace(inputs, pose=replace(inputs.pose, state=state))
+
+        flight = fly(fault=from_tick(850, hovers), ticks=6000)
+        assert phases(flight)[-4:] == [Phase.LAND, Phase.LAND_NOW, Phase.DESCEND_BLIND, Phase.KILL]
 
     def test_landing_is_pressed_down(self) -> None:
         last = [t for _, t in fly() if t.phase is Phase.LAND][-1]

@@ -135,6 +135,7 @@ def test_features() -> None:
 
 def test_recipes_and_mix() -> None:
     world, mix = load_world("crazyflie-flight"), Mix()
+    assert [row[0] for row in table("method.md", "recipe")] == list(RECIPES)
     for name, *figures in table("method.md", "recipe"):
         config = RECIPES[name]("x", (world,))
         wanted = (config.count, config.rounds, config.policy_tasks, config.members, config.capacity)

@@ -10,6 +10,7 @@ from lcd_flight.learning.evaluate import EvaluationOptions, evaluate
 from lcd_flight.learning.methods import Planned, Problem
 from lcd_flight.learning.sampling import first_tasks
 from lcd_flight.model import InputError, RolloutLabels, Tasks, TaskSampler, World
+from lcd_flight.model.streams import Stream
 from lcd_flight.planning.minimum_snap import minimum_snap_batch
 from lcd_flight.worlds import load_world
 
@@ -114,6 +115,13 @@ def test_another_seed_means_other_tasks_and_other_noise():
     evaluate(WORLD, ["minimum-snap"], 3, one, EvaluationOptions(seed=1))
     evaluate(WORLD, ["minimum-snap"], 3, other, EvaluationOptions(seed=2))
     assert not np.intersect1d(one.calls[0][2], other.calls[0][2]).size
+
+
+def test_evaluation_never_sees_the_noise_of_training():
+    simulator = KnownSimulator()
+    evaluate(WORLD, ["minimum-snap"], 3, simulator, EvaluationOptions(seed=1))
+    rows = np.arange(3)[:, None] * (1 << 20) + np.arange(3)
+    assert not np.isin(Stream(1, "training/noise").seeds(rows.reshape(-1)), simulator.calls[0][2]).any()
 
 
 def test_the_json_table():

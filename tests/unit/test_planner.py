@@ -11,6 +11,7 @@ import pytest
 
 from lcd_flight.model import FloatArray, InputError, Tasks, Trajectories
 from lcd_flight.planning.cost.proxy import ThrustProxy
+from lcd_flight.planning.cost.tracking_cost import RANGE_TOLERANCE
 from lcd_flight.planning.knots import Whitening
 from lcd_flight.planning.minimum_snap import minimum_snap_batch, snap
 from lcd_flight.planning.planner import (
@@ -242,10 +243,11 @@ def test_a_plan_whose_predicted_error_is_not_lower_is_not_taken() -> None:
 
 
 def bounded(low: float, high: float) -> cost_models.CostModel:
-    """The test cost, trained on segments between two durations."""
+    """The test cost, believed for segments between two durations."""
     column = cost_models.FEATURE_NAMES.index("log duration")
     narrow = replace(COST, feature_low=COST.feature_low.copy(), feature_high=COST.feature_high.copy())
-    narrow.feature_low[column], narrow.feature_high[column] = np.log(low), np.log(high)
+    tolerated = RANGE_TOLERANCE * np.log(high / low) / (1.0 + 2.0 * RANGE_TOLERANCE)
+    narrow.feature_low[column], narrow.feature_high[column] = np.log(low) + tolerated, np.log(high) - tolerated
     return narrow
 
 

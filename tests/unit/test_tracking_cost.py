@@ -151,10 +151,21 @@ def test_the_range_leaves_out_one_in_ten_thousand_at_either_end() -> None:
     features = np.zeros((100_001, 114))
     features[:, 0] = np.linspace(-1.0, 3.0, 100_001)
     low, high = training_range(features)
-    assert low[0] == pytest.approx(-1.0 + 4e-4 - 0.04, abs=1e-4)
-    assert high[0] == pytest.approx(3.0 - 4e-4 + 0.04, abs=1e-4)
+    assert low[0] == pytest.approx(-1.0 + 4e-4, abs=1e-4)
+    assert high[0] == pytest.approx(3.0 - 4e-4, abs=1e-4)
     assert low[1] < 0.0 < high[1]
     assert high[1] < 1e-5
+
+
+def test_a_little_beyond_the_range_is_tolerated() -> None:
+    model = cost_models.thrust_model()
+    durations, coefficients = reference.random_plans(1, 2, seed=13)
+    column = FEATURE_NAMES.index("log duration")
+    largest = float(np.log(durations.max()))
+    model.feature_low[column], model.feature_high[column] = largest - 1.2, largest - 0.1
+    assert model.in_range(durations, coefficients).all()
+    model.feature_high[column] = largest - 0.2
+    assert "log duration" in str(model.out_of_range(durations, coefficients)[0])
 
 
 def test_what_never_varied_in_training_is_out_of_range_as_soon_as_it_does() -> None:

@@ -31,8 +31,13 @@ _BATCH_WINDOWS = 512
 _STD_FLOOR_SQUARED = 1e-12
 """Below the root of the variance over members, so that its gradient exists where they agree."""
 
-_RANGE_MARGIN = 0.01
-"""Share of its span that the training range is widened by at either end: features are stored in half precision."""
+RANGE_TOLERANCE = 0.15
+"""How far beyond the training range a feature may be, as a share of its span. A long mission has thousands of features,
+each a little outside now and then, which networks that are nearly linear there survive; what the range is for is plans
+of another kind."""
+
+_LEAST_MARGIN = 1e-6
+"""So that a feature that never varied has a range, too."""
 
 
 def windows(normalised: Array) -> Array:
@@ -115,9 +120,7 @@ class CostModel:
 
     def in_range(self, durations_s: FloatArray, coefficients: FloatArray) -> BoolArray:
         """(N,) whether all features of a plan are within what the networks were trained on."""
-        features = segment_features(durations_s, coefficients)
-        inside = (features >= self.feature_low) & (features <= self.feature_high)
-        return np.asarray(inside.all(axis=(1, 2)))
+        return np.asarray((self._beyond(segment_features(durations_s, coefficients)) <= 0.0).all(axis=(1, 2)))
 
     def out_of_range(self, durations_s: FloatArray, coefficients: FloatArray) -> tuple[str | None, ...]:
         """For each plan None, or which feature is farthest out."""
@@ -125,13 +128,18 @@ class CostModel:
 
     def _farthest(self, features: FloatArray) -> str | None:
         """What of features (S, F) is farthest out, in units of the range; None where all is inside."""
-        low, high = self.feature_low, self.feature_high
-        out = np.nan_to_num(np.maximum(low - features, features - high) / (high - low), nan=np.inf)
-        segment, column = np.unravel_index(out.argmax(), out.shape)
-        if out[segment, column] <= 0.0:
+        low, high, beyond = self.feature_low, self.feature_high, self._beyond(features)
+        segment, column = np.unravel_index(beyond.argmax(), beyond.shape)
+        if beyond[segment, column] <= 0.0:
             return None
         value, bounds = features[segment, column], f"{low[column]:.3g} to {high[column]:.3g}"
         return f"{FEATURE_NAMES[column]} of segment {segment + 1} is {value:.3g}, trained on {bounds}"
+
+    def _beyond(self, features: FloatArray) -> FloatArray:
+        """How far features (..., F) are beyond what is tolerated, in spans of their range; above 0 is outside."""
+        span = self.feature_high - self.feature_low
+        beyond = np.maximum(self.feature_low - features, features - self.feature_high) / span - RANGE_TOLERANCE
+        return np.nan_to_num(beyond, nan=np.inf)
 
     def _normalised(self, features: FloatArray) -> Array:
         with np.errstate(over="ignore", invalid="ignore"):  # judged by the caller, as values that are not finite
@@ -174,5 +182,4 @@ def training_range(features: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
     rows = features.reshape(-1, features.shape[-1])
     low, high = np.quantile(rows, [0.0001, 0.9999], axis=0)
-    margin = _RANGE_MARGIN * (high - low) + 1e-6
-    return low - margin, high + margin
+    return low - _LEAST_MARGIN, high + _LEAST_MARGIN

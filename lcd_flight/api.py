@@ -1,13 +1,15 @@
 """The Python API: plan a mission, rehearse it, fly it.
 
-from lcd_flight import fly, plan, rehearse
+For example:
 
-flight = plan("missions/four_waypoints.yaml")
-rehearsal = rehearse(flight)
-print(rehearsal.text)
-if rehearsal.passed:
-flown = fly(flight, rehearsal, FlightOptions(fast=True))
-print(flown.result.outcome, flown.figures.max_position_error_m, flown.log)
+    from lcd_flight import FlightOptions, fly, plan, rehearse
+
+    flight = plan("missions/four_waypoints.yaml")
+    rehearsal = rehearse(flight)
+    print(rehearsal.text)
+    if rehearsal.passed:
+        flown = fly(flight, rehearsal, FlightOptions(fast=True))
+        print(flown.result.outcome, flown.figures.max_position_error_m, flown.log)
 """
 
 from __future__ import annotations

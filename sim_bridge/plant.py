@@ -131,8 +131,8 @@ class Plant:
         return float(self._craft.air.k_eta * (a * a + b * b + c * c + d * d))
 
     def _has_crashed(self) -> bool:
-        """Whether it may not fly on. Written so that NaN counts."""
+        """Whether it may not fly on; what is not a number is within nothing."""
         _, v, _, w = load_motion(self._memory, rows.MOTION, 0)
-        within = max(map(abs, v)) <= MAX_SPEED and max(map(abs, w)) <= MAX_RATE
+        within = all(abs(x) <= MAX_SPEED for x in v) and all(abs(x) <= MAX_RATE for x in w)
         soft = self._contact[IMPACT_SPEED] <= CRASH_SPEED and self._contact[IMPACT_UPRIGHT] >= CRASH_UPRIGHT
         return not (within and soft)

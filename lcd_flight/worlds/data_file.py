@@ -72,6 +72,8 @@ def _problem(error: Any) -> str:
     """One of pydantic's errors in our words."""
     key = ".".join(str(part) for part in error["loc"])
     value = error["input"]
+    if not key:  # of the file as a whole
+        return str(error["msg"].removeprefix("Value error, "))
     if error["type"] == "missing":
         return f"{key}: this key is missing"
     if error["type"] == "extra_forbidden":

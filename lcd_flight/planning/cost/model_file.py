@@ -121,7 +121,7 @@ def check_fits(model: CostModel, vehicle_fingerprint: str, loop: Loop) -> None:
     if card.loop != loop:
         raise InputError(
             f"model {card.name}: trained for the {card.loop} loop, not for the {loop} loop; "
-            f"train one with `lcd train --loop {loop}`, or plan with minimum-snap"
+            f"train one with `lcd train` on worlds of that loop, or plan with minimum-snap"
         )
 
 

@@ -69,6 +69,11 @@ def test_near_the_ground_it_brakes_harder_and_stops_above(v_W: Vector3) -> None:
     assert math.hypot(*path.reference(0.0).a_W) <= HARDEST_DECELERATION + 1e-9
 
 
+def test_no_stop_is_harder_than_thrust_can_do_it() -> None:
+    path = stop(State((0.0, 0.0, 0.2), (0.0, 0.0, -3.0), from_yaw(0.0), (0.0, 0.0, 0.0)), ground_z_m=0.0)
+    assert math.hypot(*path.reference(0.0).a_W) == pytest.approx(HARDEST_DECELERATION)
+
+
 def test_landing_from_below_the_ground_still_presses_down() -> None:
     low = State((0.0, 0.0, -0.1), (0.0, 0.0, 0.0), from_yaw(0.0), (0.0, 0.0, 0.0))
     path = land_from(low, ground_z_m=0.0)

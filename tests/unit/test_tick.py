@@ -517,6 +517,20 @@ class TestRoute:
         begins = next(i for i, (_, t) in enumerate(flight) if t.leg == 3)
         assert begins - 3 == pytest.approx(350 + 500, abs=2)
 
+    def test_time_beyond_the_end_of_a_leg_counts_for_the_next(self) -> None:
+        """Else every leg would begin up to a tick late, and the flight would fall behind its rehearsal."""
+        height = WAYPOINTS[0].tolist()
+        legs = (
+            Leg(LegKind.TAKEOFF, straight([0.0, 0.0, 0.0, 0.0], height, 1.004)),
+            *(Leg(LegKind.HOLD, Trajectory.hover(height[:3], 0.0, 0.104)) for _ in range(5)),
+            Leg(LegKind.LAND, straight(height, [0.0, 0.0, 0.0, 0.0], 1.5)),
+        )
+        flight = fly(FlightSetup.of(FlightPlan(legs), setup().vehicle, LIMITS))
+        landing = next(t for _, t in flight if t.leg == 6)
+        flown_s = (landing.now_ns - START_NS) * 1e-9 - 0.03
+        assert flown_s == pytest.approx(1.004 + 5 * 0.104 + landing.leg_time_s)
+        assert landing.leg_time_s < 0.01
+
     def test_a_plan_without_landing_is_landed(self) -> None:
         whole = plan()
         airborne = FlightPlan(tuple(leg for leg in whole.legs if leg.kind is not LegKind.LAND))

@@ -44,7 +44,7 @@ class Flying:
 
     phase: Phase
     entered: bool
-    """Whether the phase began since the last report."""
+    """Whether the phase or the leg began since the last report."""
     time_s: float
     """Since take-off; 0 before."""
     kind: LegKind | None
@@ -72,11 +72,12 @@ Progress = Callable[[Connected | Checked | Flying], None]
 
 
 class Reporter:
-    """The observer behind `Flying`: reports at each change of phase, at each new finding, and at 10 Hz."""
+    """The observer behind `Flying`: reports at each change of phase or leg, at each new finding, and at 10 Hz."""
 
     def __init__(self, setup: FlightSetup, progress: Progress) -> None:
         self._setup, self._progress = setup, progress
-        self._phase: Phase | None = None
+        self._where: tuple[Phase, int] | None = None
+        """Phase and leg of the last report."""
         self._takeoff_ns: int | None = None
         self._max_error_m = 0.0
         self._reported_ns: int | None = None
@@ -90,12 +91,12 @@ class Reporter:
             self._takeoff_ns = tick.now_ns
         if tick.position_error_W is not None and tick.phase.airborne:
             self._max_error_m = max(self._max_error_m, math.hypot(*tick.position_error_W))
-        entered = tick.phase is not self._phase
+        entered = (tick.phase, tick.leg) != self._where
         findings = self._new_findings(tick)
         due = self._reported_ns is None or tick.now_ns - self._reported_ns >= REPORT_NS
         if entered or findings or due:
             self._progress(self._report(inputs, tick, entered, findings))
-            self._phase, self._reported_ns, self._ticks = tick.phase, tick.now_ns, 0
+            self._where, self._reported_ns, self._ticks = (tick.phase, tick.leg), tick.now_ns, 0
 
     def close(self) -> None:
         """Nothing is held."""

@@ -62,7 +62,8 @@ class TestCleanFlight:
         assert events[0] == Connected("sim://", "firmware sim-1")
         assert sum(isinstance(event, Checked) and event.ok for event in events) == 1
         flying = [event for event in events if isinstance(event, Flying)]
-        assert [event.phase for event in flying if event.entered] == [*UP, Phase.LAND, Phase.LANDED]
+        entered = [event.phase for event in flying if event.entered]
+        assert entered == [*UP, Phase.TRACK, Phase.TRACK, Phase.LAND, Phase.LANDED]
         assert all(event.findings == () for event in flying)
         in_air = [event for event in flying if event.phase is Phase.TRACK]
         assert len(in_air) == pytest.approx(10 * (in_air[-1].time_s - in_air[0].time_s), abs=5)

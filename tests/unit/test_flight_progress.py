@@ -29,9 +29,13 @@ def told(fault: Fault = lambda _tick, inputs: inputs, ticks: int = 3000) -> list
 
 
 class TestReporter:
-    def test_reports_at_10_hz_and_at_every_phase(self) -> None:
+    def test_reports_at_10_hz_and_at_every_phase_and_leg(self) -> None:
         events = told()
-        assert [e.phase for e in events if e.entered][-3:] == [Phase.TRACK, Phase.LAND, Phase.LANDED]
+        assert [e.phase for e in events if e.entered][-5:] == [
+            *[Phase.TRACK] * 3,
+            Phase.LAND,
+            Phase.LANDED,
+        ]
         between = [e for e in events if not e.entered]
         assert len(between) == pytest.approx(events[-1].time_s * 10, abs=10)
 

@@ -146,4 +146,4 @@ class Rehearse(Keys):
     runs: Annotated[Whole, Field(ge=1, le=10_000)] = 20
     """How many flights."""
     faults: Annotated[tuple[Fault, ...], Field(max_length=2)] = ("motor_noise", "mocap_dropout")
-    """What disturbs them: noise of the motors; a gap of 10 to 50 ms in the poses of each run."""
+    """What disturbs them: noise of the motors; a gap of 10 to 40 ms in the poses of each run."""

@@ -9,9 +9,8 @@ from lcd_flight.model.streams import Stream
 
 TICKS_PER_S = 100
 """The control loop's rate, in whose ticks the simulator counts gaps."""
-LONGEST_GAP_TICKS = 5
-"""50 ms: up to here the flight coasts (`SafetyLimits.pose_coast_s`); a longer gap makes it brake, which no plan
-foresees."""
+LONGEST_GAP_TICKS = 4
+"""Up to here the flight coasts (`SafetyLimits.pose_coast_s`); from five frames on it brakes, which no plan foresees."""
 
 
 def noise_seeds(seed: int, first: int, count: int) -> SeedArray:

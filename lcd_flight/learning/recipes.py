@@ -70,12 +70,12 @@ def small_recipe(name: str, worlds: tuple[World, ...], seed: int = 0) -> TrainCo
 
 
 def medium_recipe(name: str, worlds: tuple[World, ...], seed: int = 0) -> TrainConfig:
-    """About two million labels and two networks."""
+    """About two million labels and two networks; what `crazyflie-flight` was made by, from three speeds."""
     return TrainConfig(name, worlds, seed, count=1_500_000, rounds=2, policy_tasks=12_000, members=2)
 
 
 def full_recipe(name: str, worlds: tuple[World, ...], seed: int = 0) -> TrainConfig:
-    """About four million labels and two networks; what the shipped models are made by."""
+    """About four million labels and two networks; what `crazyflie-paper` was made by."""
     return TrainConfig(name, worlds, seed, count=2_600_000, rounds=3, policy_tasks=25_500, members=2)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from lcd_flight.mission.assemble import Planned, TrajectoryTask, flight_plan, trajectory_tasks
 from lcd_flight.mission.mission import Mission
 from lcd_flight.mission.path_checks import require_flyable
-from lcd_flight.model import FlightPlan, FloatArray, Vehicle
+from lcd_flight.model import FlightPlan, FloatArray, InputError, Vehicle
 from lcd_flight.planning.cost.model_card import ModelCard
 from lcd_flight.planning.cost.model_file import SUFFIX, check_fits, load_model, model_names
 from lcd_flight.planning.cost.tracking_cost import CostModel
@@ -85,8 +85,11 @@ def load_cost(mission: Mission, vehicle: Vehicle) -> CostModel:
     """
     name = mission.planner.model or f"{vehicle.name}-flight"
     shipped = name in model_names() or not name.endswith(SUFFIX)
-    model = load_model(name if shipped else mission.folder / name)
-    check_fits(model, fingerprint(vehicle, "flight"), "flight")
+    try:
+        model = load_model(name if shipped else mission.folder / name)
+        check_fits(model, fingerprint(vehicle, "flight"), "flight")
+    except InputError as error:
+        raise InputError(f"{mission.place('planner', 'model')}: {error}") from error
     return model
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from lcd_flight.mission import Mission, load_mission
+from lcd_flight.mission.airframe import vehicle_of
 from lcd_flight.mission.path_checks import violations
 from lcd_flight.mission.plan_mission import load_cost, plan_mission
 from lcd_flight.model import FloatArray, InputError, LegKind, RefusedError
@@ -192,3 +194,16 @@ def test_the_model_is_named_by_the_mission_or_by_the_vehicle(tmp_path: Path) -> 
 def test_a_right_plan_has_no_violations() -> None:
     planned = plan_mission(planner(), VEHICLE)
     assert list(violations(planned.plan, planner(), VEHICLE)) == []
+
+
+def test_a_damaged_model_is_told_with_file_line_and_key(tmp_path: Path) -> None:
+    shipped = Path(str(resources.files("lcd_flight.planning") / "models" / "crazyflie-flight.safetensors"))
+    data = bytearray(shipped.read_bytes())
+    data[-1000] ^= 1
+    (tmp_path / "bad.safetensors").write_bytes(data)
+    mission = tmp_path / "mission.yaml"
+    text = (Path(__file__).parents[2] / "missions" / "four_waypoints.yaml").read_text()
+    mission.write_text(text.replace("type: learned\n", "type: learned\n  model: bad.safetensors\n"))
+    loaded = load_mission(mission)
+    with pytest.raises(InputError, match=r"mission\.yaml:\d+: planner\.model: .*checksum"):
+        load_cost(loaded, vehicle_of(loaded))

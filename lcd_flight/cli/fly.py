@@ -39,18 +39,21 @@ def fly(
     third one stops the motors. Exit codes: 0 landed, 2 wrong input, 3 refused before arming, 4 ended early but landed,
     5 crashed or cut.
     """
+    from lcd_flight.mission import load_mission
+
     if sim and link is not None:
         raise InputError("--sim and --link exclude each other; leave one out")
     terminal = Terminal(json_line=json, quiet=quiet, color=not no_color)
     terminal.announce_compilation()
-    flight = tell_plan(terminal, mission)
+    loaded = load_mission(mission)
+    options = _options(terminal, loaded, "sim://" if sim else link, fast=fast, arm=not no_arm, yes=yes)
+    flight = tell_plan(terminal, loaded)
     rehearsal = _rehearse(terminal, flight, rehearse)
     facts = {"predicted_max_error_m": rehearsal.max_error_m, "log": None, "report": None}
     if not rehearsal.passed:
         return terminal.fail(Outcome.REFUSED, rehearsal.refusal, facts)
     if plan_only:
         return terminal.finish(Outcome.OK, {**plan_facts(flight), **facts})
-    options = _options(terminal, flight.mission, "sim://" if sim else link, fast=fast, arm=not no_arm, yes=yes)
     flown = _fly(terminal, flight, rehearsal, options, log)
     return _finish(terminal, flown)
 
@@ -70,7 +73,7 @@ def _options(
     import sys
 
     from lcd_flight.flight.operator import Operator
-    from lcd_flight.flight.session import FlightOptions, is_simulated
+    from lcd_flight.flight.session import FlightOptions
 
     async def agree(operator: Operator) -> bool:
         if yes or not mission.safety.confirm:
@@ -79,8 +82,23 @@ def _options(
         return await operator.agreed()
 
     anybody = yes or not mission.safety.confirm or sys.stdin.isatty()
-    asked = anybody and not is_simulated(uri or mission.vehicle.uri)
+    asked = not _simulated(mission, uri) and anybody
     return FlightOptions(uri=uri, fast=fast, arm=arm, confirm=agree if asked else None)
+
+
+def _simulated(mission: Mission, uri: str | None) -> bool:
+    """Whether the link leads to the simulator.
+
+    Raises:
+        InputError: there is no such link; where the mission names it, with the line.
+    """
+    from lcd_flight.flight.session import is_simulated
+
+    try:
+        return is_simulated(uri or mission.vehicle.uri)
+    except InputError as error:
+        where = f"--link {uri}" if uri else mission.place("vehicle", "uri")
+        raise InputError(f"{where}: {error}") from error
 
 
 def _fly(
@@ -129,7 +147,7 @@ def _summarise(terminal: Terminal, flown: FlownMission) -> None:
     )
     if figures.predicted_max_error_m is not None and figures.overall_max_error_m is not None:
         terminal.detail(
-            f"predicted / flown max error: {figures.predicted_max_error_m:.2f} / {figures.overall_max_error_m:.2f} m"
+            f"rehearsed / flown max error: {figures.predicted_max_error_m:.2f} / {figures.overall_max_error_m:.2f} m"
         )
     terminal.detail(f"log    {flown.log} ({flown.log.stat().st_size / 1e6:.1f} MB, opens in Foxglove)")
     terminal.detail(f"report {flown.report}")

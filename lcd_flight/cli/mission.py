@@ -9,7 +9,7 @@ import typer
 
 from lcd_flight.cli.options import Json, NoColor, Quiet
 from lcd_flight.cli.terminal import Terminal
-from lcd_flight.errors import Outcome
+from lcd_flight.errors import InputError, Outcome
 
 if TYPE_CHECKING:
     from lcd_flight.api import PreparedFlight
@@ -27,7 +27,18 @@ def check(mission: MissionArgument, json: Json = False, quiet: Quiet = False, no
     terminal = Terminal(json_line=json, quiet=quiet, color=not no_color)
     loaded = load_mission(mission)
     tell_mission(terminal, loaded)
+    _tell_link(terminal, loaded)
     return terminal.finish(Outcome.OK, mission_facts(loaded))
+
+
+def _tell_link(terminal: Terminal, mission: Mission) -> None:
+    """Warn of a link that is not there: such a mission can still be flown with --sim, and elsewhere."""
+    from lcd_flight.plugins.links import parse_uri
+
+    try:
+        parse_uri(mission.vehicle.uri)
+    except InputError as error:
+        terminal.warn(f"{mission.place('vehicle', 'uri')}: {error}")
 
 
 def plan(mission: MissionArgument, json: Json = False, quiet: Quiet = False, no_color: NoColor = False) -> int:
@@ -61,7 +72,7 @@ def tell_mission(terminal: Terminal, mission: Mission) -> None:
     terminal.line(
         "CHECK",
         f"mission ok: {mission.name}, {facts['waypoints']} waypoints, {facts['length_m']:.1f} m, "
-        f"waypoints {facts['fence_clearance_m']:.2f} m or more inside the fence",
+        f"waypoints {facts['fence_clearance_m']:.2f} m or more inside the fence, path not planned yet",
     )
 
 
@@ -122,7 +133,7 @@ def _tell_trajectory(terminal: Terminal, summary: TrajectorySummary, took_ms: fl
     thrust = f"peak thrust {before.thrust_ratio.value:.0%} -> {after.thrust_ratio.value:.0%}"
     if summary.fallback is not None:
         terminal.line("PLAN", f"minimum snap, {took_ms:.0f} ms")
-        terminal.warn(f"{summary.place}: the learned plan was not used: {summary.fallback}; minimum snap is rehearsed")
+        terminal.warn(f"{summary.place}: minimum snap in place of the learned plan: {summary.fallback}")
     elif summary.method == "minimum-snap":
         terminal.line("PLAN", f"minimum snap, {took_ms:.0f} ms")
         terminal.detail(f"peak thrust {after.thrust_ratio.value:.0%}; peak speed {after.speed.value:.1f} m/s")

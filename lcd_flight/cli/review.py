@@ -34,6 +34,8 @@ def review(
         write_path_figure(flight, picture)
     terminal.line("REVIEW", str(page))
     for key, value in figures.items():
+        if key == "phases":
+            continue  # a table of its own on the page
         terminal.detail(f"{key:<28} {_text(value)}")
     return terminal.finish(Outcome.OK, {**figures, "log": str(log), "report": str(page)})
 

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from lcd_flight.mission.airframe import gains_fit, vehicle_fits
 from lcd_flight.mission.checks import CHECKS, contradictions
 from lcd_flight.mission.draft import Draft
-from lcd_flight.mission.explain import did_you_mean, explanations, shown
+from lcd_flight.mission.explain import explanations, shown
 from lcd_flight.mission.mission import Mission, Source, with_source
 from lcd_flight.mission.problems import Key, MissionError, Problem
 from lcd_flight.mission.source_file import read_text
@@ -49,7 +49,8 @@ def find_mission(name_or_path: str | Path) -> Path:
         return path
     shipped = shipped_missions()
     if path.name not in shipped:
-        raise InputError(f"{path}: no such mission; {did_you_mean(path.name, shipped)}, or give a file's path")
+        names = ", ".join(shipped)
+        raise InputError(f"{path}: no such mission; give a file's path, or the name of one that ships: {names}")
     return shipped[path.name]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from lcd_flight.mission.assemble import Planned, TrajectoryTask, flight_plan, trajectory_tasks
 from lcd_flight.mission.mission import Mission
 from lcd_flight.mission.path_checks import require_flyable
-from lcd_flight.model import FlightPlan, FloatArray, InputError, Vehicle
+from lcd_flight.model import FlightPlan, FloatArray, InputError, RefusedError, Vehicle
 from lcd_flight.planning.cost.model_card import ModelCard
 from lcd_flight.planning.cost.model_file import SUFFIX, check_fits, load_model, model_names
 from lcd_flight.planning.cost.tracking_cost import CostModel
@@ -73,8 +73,20 @@ def plan_mission(mission: Mission, vehicle: Vehicle, cost: TrackingCost | None =
         cost = load_cost(mission, vehicle)
     made = [_plan(task, mission, vehicle, cost) for task in tasks]
     plan = flight_plan(mission, [planned for planned, _ in made])
-    require_flyable(plan, mission, vehicle)
-    return PlannedMission(plan, tuple(summary for _, summary in made), _card(cost))
+    summaries = tuple(summary for _, summary in made)
+    _require_flyable(plan, mission, vehicle, summaries)
+    return PlannedMission(plan, summaries, _card(cost))
+
+
+def _require_flyable(
+    plan: FlightPlan, mission: Mission, vehicle: Vehicle, summaries: tuple[TrajectorySummary, ...]
+) -> None:
+    """As `require_flyable`; says, too, which trajectories are minimum snap though more was asked for."""
+    try:
+        require_flyable(plan, mission, vehicle)
+    except RefusedError as error:
+        fallen = [f"{s.place}: the learned plan was not used: {s.fallback}" for s in summaries if s.fallback]
+        raise RefusedError("\n".join([str(error), *fallen])) from error
 
 
 def load_cost(mission: Mission, vehicle: Vehicle) -> CostModel:

@@ -152,3 +152,28 @@ def test_bench_lists_what_there_is(said: Any) -> None:
     code, facts, _ = said(app, "bench")
     assert code == 0
     assert {"rollouts", "plan", "mocap", "log"} <= set(facts["benchmarks"])
+
+
+def test_an_unknown_link_in_the_mission_is_told_before_planning(said: Any, tmp_path: Path) -> None:
+    mission = tmp_path / "mission.yaml"
+    mission.write_text(FOUR.read_text().replace("sim://", "simm://"))
+    code, facts, story = said(flyer, str(mission), "--log", str(tmp_path))
+    assert code == 2
+    assert facts["error"].startswith(f"{mission}:9: vehicle.uri: unknown link 'simm'")
+    assert "PLAN" not in story
+    code, _, story = said(app, "check", str(mission))
+    assert code == 0
+    assert "WARN" in story
+    assert "unknown link 'simm'" in story
+
+
+def test_a_path_refused_says_that_the_learned_plan_was_not_used(said: Any, tmp_path: Path) -> None:
+    mission = tmp_path / "mission.yaml"
+    slow = (
+        FOUR.read_text().replace("speed: 1.5 ", "speed: 0.2 ").replace("max: [4.5, 4.5, 3.5]", "max: [2.6, 2.6, 1.9]")
+    )
+    mission.write_text(slow)
+    code, facts, _ = said(app, "plan", str(mission))
+    assert code == 3
+    assert "outside safety.geofence" in facts["error"]
+    assert "the learned plan was not used" in facts["error"]

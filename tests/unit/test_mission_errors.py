@@ -542,7 +542,7 @@ def test_an_unknown_name_says_what_ships(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError) as caught:
         load_mission("dmo")
-    assert str(caught.value) == "dmo: no such mission; did you mean demo? (only demo), or give a file's path"
+    assert str(caught.value) == "dmo: no such mission; give a file's path, or the name of one that ships: demo"
 
 
 def test_a_list_is_not_called_short_for_wrong_items(tmp_path: Path) -> None:

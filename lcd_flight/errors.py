@@ -21,7 +21,7 @@ class Outcome(StrEnum):
     """Long work was stopped by the user; running the command again goes on where it stopped."""
     CRASHED = "crashed"
     CUT = "cut"
-    """Motors were stopped in the air."""
+    """Motors were stopped in the air, or a descent without pose ran its time."""
     INTERNAL_ERROR = "internal_error"
     """A fault of ours."""
 

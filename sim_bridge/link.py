@@ -44,7 +44,7 @@ class SimOptions(msgspec.Struct, frozen=True):
     twist: bool = True
     """Whether velocity and body rates are published beside the pose."""
     battery_V: Annotated[float, msgspec.Meta(ge=0.0, le=100.0)] | None = None
-    """Voltage to start with, in place of the mission's."""
+    """Voltage to start with; None: a full battery."""
     pose_gap_s: Annotated[float, msgspec.Meta(ge=0.0, le=1e6)] | None = None
     """When a gap in the published poses begins."""
     pose_gap_ms: Annotated[float, msgspec.Meta(ge=0.0, le=1e9)] = 200.0

@@ -119,7 +119,7 @@ class Safety(Keys):
     on_mocap_lost: Literal["land", "cut"] = "land"
     """Level descent without pose, or stop the motors."""
     on_link_lost: Literal["cut"] = "cut"
-    """The vehicle's own watchdog acts."""
+    """Without the link the vehicle's own watchdog acts; kept for links that let it be chosen, none does yet."""
     on_battery_critical: Literal["land", "warn"] = "land"
     """Land at once, or warn only."""
     confirm: Switch = True

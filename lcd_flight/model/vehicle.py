@@ -54,7 +54,7 @@ class OnboardController:
 
 @dataclass(frozen=True, slots=True)
 class Vehicle:
-    """A multirotor with four rotors. Equations: `sim_bridge.multirotor`; where figures come from: `source`."""
+    """A multirotor with four rotors. Equations: `sim_bridge.kernels.multirotor`; where figures come from: `source`."""
 
     name: str
     mass_kg: float

@@ -23,17 +23,17 @@ _MOST_ATTEMPTS = 10_000
 def sample_tasks(sampler: TaskSampler, seed: int, indices: IntArray, purpose: Purpose = "evaluation") -> Tasks:
     """The tasks with the given global indices (N,); those for training are others than those for evaluation.
 
-    The first waypoint is uniform in the box. Each next one is a step away, uniform in the shell between the sampler's
-    distances; where it would leave the box it stops at the wall, and is drawn again where that made it too short.
-    The paper says no more than "four waypoints in sequence", "at least 1 m and no more than 3 m apart from the
-    previous one"; why it is this reading: decision 0040.
+    The first waypoint is uniform in the room: the domain without its margin. Each next one is a step away, uniform in
+    the shell between the sampler's distances, drawn again until it lies in the room too. The paper says no more than
+    "four waypoints in sequence", "at least 1 m and no more than 3 m apart from the previous one"; why it is this
+    reading: decision 0040.
 
     Raises:
         ValueError: the sampler's box has no room for its distances.
     """
     indices = np.asarray(indices, dtype=np.int64)
     waypoints = np.empty((len(indices), sampler.waypoints, 3))
-    low, high = _box(sampler)
+    low, high = _room(sampler)
     waypoints[:, 0] = low + (high - low) * Stream(seed, f"{purpose}/first").uniforms(indices, 3)
     for k in range(1, sampler.waypoints):
         stream = Stream(seed, f"{purpose}/waypoint/{k}")
@@ -47,11 +47,11 @@ def first_tasks(sampler: TaskSampler, seed: int, count: int) -> Tasks:
     return sample_tasks(sampler, seed, np.arange(count))
 
 
-def _box(sampler: TaskSampler) -> tuple[FloatArray, FloatArray]:
-    """Least and greatest corner of the domain, m."""
+def _room(sampler: TaskSampler) -> tuple[FloatArray, FloatArray]:
+    """Least and greatest corner of where waypoints may lie, m."""
     size = np.asarray(sampler.box_m)
     low = np.array([-0.5 * size[0], -0.5 * size[1], 0.0])
-    return low, low + size
+    return low + sampler.margin_m, low + size - sampler.margin_m
 
 
 def _next_waypoint(sampler: TaskSampler, stream: Stream, indices: IntArray, previous: FloatArray) -> FloatArray:
@@ -60,7 +60,7 @@ def _next_waypoint(sampler: TaskSampler, stream: Stream, indices: IntArray, prev
     Attempt a uses draws 3a to 3a + 2 of the task's own stream, so that a task's luck does not depend on the others.
     """
     nearest, farthest = sampler.distance_m
-    low, high = _box(sampler)
+    low, high = _room(sampler)
     result = np.empty_like(previous)
     pending = np.arange(len(indices))
     for attempt in range(_MOST_ATTEMPTS):
@@ -68,9 +68,9 @@ def _next_waypoint(sampler: TaskSampler, stream: Stream, indices: IntArray, prev
             return result
         step = farthest * (2.0 * stream.uniforms(indices[pending], 3, first=3 * attempt) - 1.0)
         length = np.linalg.norm(step, axis=1)
-        candidate = np.clip(previous[pending] + step, low, high)
-        reached = np.linalg.norm(candidate - previous[pending], axis=1)
-        good = (nearest <= reached) & (length <= farthest)
+        candidate = previous[pending] + step
+        inside = ((low <= candidate) & (candidate <= high)).all(axis=1)
+        good = (nearest <= length) & (length <= farthest) & inside
         result[pending[good]] = candidate[good]
         pending = pending[~good]
     raise ValueError(f"no waypoint found {nearest:g} to {farthest:g} m from the last one in a box of {sampler.box_m} m")

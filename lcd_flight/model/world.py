@@ -21,6 +21,8 @@ class TaskSampler:
     """Least and greatest distance from the previous waypoint."""
     yaw_span_rad: float
     """Yaw of each waypoint is uniform in +- this; 0 keeps it at zero."""
+    margin_m: float = 0.0
+    """How far waypoints stay from the walls of the domain."""
 
 
 @dataclass(frozen=True, slots=True)

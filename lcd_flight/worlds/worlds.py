@@ -22,6 +22,7 @@ class SamplerData(Strict):
 
     waypoints: Annotated[int, Field(ge=2)]
     box_m: tuple[Positive, Positive, Positive]
+    margin_m: NotNegative
     distance_m: tuple[Positive, Positive]
     yaw_span_rad: NotNegative
 

@@ -1,6 +1,7 @@
 """The sampler of tasks and its random streams: independent of count and grouping, and the paper's distribution."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from lcd_flight.learning.sampling import first_tasks, sample_tasks
 from lcd_flight.model import TaskSampler
 from lcd_flight.model.streams import Stream
 
-PAPER = TaskSampler(waypoints=4, box_m=(10.0, 10.0, 10.0), distance_m=(1.0, 3.0), yaw_span_rad=0.85 * math.pi)
+PAPER = TaskSampler(4, (10.0, 10.0, 10.0), (1.0, 3.0), yaw_span_rad=0.85 * math.pi, margin_m=2.0)
 
 
 def test_a_draw_depends_on_seed_domain_index_and_number_alone():
@@ -42,15 +43,15 @@ def test_uniforms_and_normals_have_their_moments():
 
 
 @pytest.mark.parametrize("waypoints", [2, 4, 10])
-def test_tasks_keep_the_box_and_the_distances(waypoints):
-    sampler = TaskSampler(waypoints, PAPER.box_m, PAPER.distance_m, PAPER.yaw_span_rad)
+def test_tasks_keep_the_margin_and_the_distances(waypoints):
+    sampler = replace(PAPER, waypoints=waypoints)
     tasks = first_tasks(sampler, seed=3, count=2_000)
     distances = np.linalg.norm(np.diff(tasks.waypoints_m, axis=1), axis=2)
     assert tasks.waypoints_m.shape == (2_000, waypoints, 3)
     assert distances.min() >= 1.0
     assert distances.max() <= 3.0
-    assert np.all(tasks.waypoints_m >= [-5.0, -5.0, 0.0])
-    assert np.all(tasks.waypoints_m <= [5.0, 5.0, 10.0])
+    assert np.all(tasks.waypoints_m >= [-3.0, -3.0, 2.0])
+    assert np.all(tasks.waypoints_m <= [3.0, 3.0, 8.0])
     assert np.abs(tasks.yaws_rad).max() <= sampler.yaw_span_rad
 
 
@@ -74,15 +75,24 @@ def test_a_task_is_the_same_whatever_the_count_and_the_grouping():
 
 
 def test_more_waypoints_go_on_from_the_same_ones():
-    longer = TaskSampler(6, PAPER.box_m, PAPER.distance_m, PAPER.yaw_span_rad)
+    longer = replace(PAPER, waypoints=6)
     assert np.array_equal(first_tasks(longer, 5, 50).waypoints_m[:, :4], first_tasks(PAPER, 5, 50).waypoints_m)
 
 
-def test_a_step_through_a_wall_stops_at_it():
-    """A tenth of the waypoints or so lie on a wall; none is nearer to the last one than it may be."""
-    points = first_tasks(PAPER, seed=2, count=4_000).waypoints_m[:, 1:] - [0.0, 0.0, 5.0]
-    on_a_wall = np.isclose(np.abs(points), 5.0).any(axis=2)
-    assert 0.2 < on_a_wall.mean() < 0.4
+def test_waypoints_are_uniform_among_those_allowed():
+    """As RotorPy draws them: anywhere in the room, again until the distance from the last one is good."""
+    tasks = first_tasks(PAPER, seed=2, count=20_000).waypoints_m - [0.0, 0.0, 5.0]
+    before, after = tasks[:, 0], tasks[:, 1]
+    anywhere = np.random.default_rng(0).uniform(-3.0, 3.0, (200, *before.shape))
+    distance = np.linalg.norm(anywhere - before, axis=2)
+    good = (distance >= 1.0) & (distance <= 3.0)
+    expected = anywhere[good.argmax(axis=0), np.arange(len(before))]
+    for ours, wanted in ((after, expected), (after - before, expected - before)):
+        assert np.allclose(
+            np.quantile(ours, [0.1, 0.3, 0.5, 0.7, 0.9], axis=0),
+            np.quantile(wanted, [0.1, 0.3, 0.5, 0.7, 0.9], axis=0),
+            atol=0.1,
+        )
 
 
 def test_training_and_evaluation_never_share_a_task():
@@ -91,7 +101,7 @@ def test_training_and_evaluation_never_share_a_task():
 
 
 def test_no_yaw_span_means_yaw_zero():
-    assert not first_tasks(TaskSampler(4, PAPER.box_m, PAPER.distance_m, 0.0), 1, 10).yaws_rad.any()
+    assert not first_tasks(replace(PAPER, yaw_span_rad=0.0), 1, 10).yaws_rad.any()
 
 
 def test_an_impossible_sampler_says_so():

@@ -43,7 +43,10 @@ class Series:
     """(T, 3)"""
     reference_a_W: FloatArray
     """(T, 3)"""
+    reference_j_W: FloatArray
+    """(T, 3)"""
     reference_yaw_rad: FloatArray
+    reference_yaw_rate: FloatArray
     setpoint_thrust_N: FloatArray
     setpoint_q_WB: FloatArray
     """(T, 4) xyzw"""
@@ -125,7 +128,9 @@ def series_of(pairs: Sequence[tuple[TickInputs, Tick]]) -> Series:
         reference_p_W=_table(references, "p_W", 3),
         reference_v_W=_table(references, "v_W", 3),
         reference_a_W=_table(references, "a_W", 3),
+        reference_j_W=_table(references, "j_W", 3),
         reference_yaw_rad=_column(references, "yaw_rad"),
+        reference_yaw_rate=_column(references, "yaw_rate"),
         setpoint_thrust_N=_column(setpoints, "thrust_N"),
         setpoint_q_WB=_table(setpoints, "q_WB", 4),
         position_error_W=_table(ticks, "position_error_W", 3),

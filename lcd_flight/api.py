@@ -26,9 +26,9 @@ from lcd_flight.flight.session import FlightOptions, run_flight
 from lcd_flight.mission import Mission, load_mission
 from lcd_flight.mission.airframe import vehicle_of
 from lcd_flight.mission.plan_mission import PlannedMission, plan_mission
-from lcd_flight.model import RefusedError, Vehicle
+from lcd_flight.model import LegKind, RefusedError, Vehicle
 from lcd_flight.observers.log_thread import LogStatistics, LogThread
-from lcd_flight.record import FlightHeader, LogWriter, log_path, read_log
+from lcd_flight.record import FlightHeader, LogWriter, Prediction, log_path, read_log
 from lcd_flight.rehearsal.rehearse import rehearse as fly_in_simulation
 from lcd_flight.rehearsal.verdict import Rehearsal
 from lcd_flight.review.figures import FlightFigures, figures_of
@@ -138,5 +138,24 @@ def _header(
         planner=mission.planner.type,
         model_card={} if card is None else card.model_dump(mode="json"),
         predicted_max_error_m=rehearsal.max_error_m,
+        predictions=_predictions(flight.planned),
         notes={"rehearsal": rehearsal.text},
+    )
+
+
+def _predictions(planned: PlannedMission) -> tuple[Prediction, ...]:
+    """What the planner expected of each trajectory, so that a review has it without planning."""
+    legs = [number for number, leg in enumerate(planned.plan.legs) if leg.kind is LegKind.TRAJECTORY]
+    return tuple(
+        Prediction(
+            leg=leg,
+            method=summary.method,
+            relative_snap=summary.relative_snap,
+            cost=summary.cost,
+            minimum_snap_cost=summary.minimum_snap_cost,
+            segment_errors_m=summary.segment_errors_m,
+            minimum_snap_segment_errors_m=summary.minimum_snap_segment_errors_m,
+            fallback=summary.fallback,
+        )
+        for leg, summary in zip(legs, planned.summaries, strict=True)
     )

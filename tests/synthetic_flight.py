@@ -34,7 +34,7 @@ from lcd_flight.model import (
 )
 from lcd_flight.model.frames import from_yaw, multiply, normalized
 from lcd_flight.model.types import Quaternion, Vector3
-from lcd_flight.record import FlightHeader, FlightLog
+from lcd_flight.record import FlightHeader, FlightLog, Prediction
 from lcd_flight.record.flight_log import findings_of, series_of
 from lcd_flight.worlds import load_vehicle
 
@@ -47,6 +47,16 @@ SOURCE_BEHIND_NS = 4_000_000_000_000
 
 WAYPOINTS = np.array([[0.0, 0.0, 1.0, 0.0], [1.5, 0.5, 1.2, 0.4], [2.5, 2.0, 1.8, 1.5], [1.0, 2.5, 1.0, 2.2]])
 SEGMENT_S = 1.5
+
+PREDICTION = Prediction(
+    leg=2,
+    method="learned",
+    relative_snap=1.7,
+    cost=-1.2,
+    minimum_snap_cost=-0.4,
+    segment_errors_m=(0.08, 0.15, 0.09),
+    minimum_snap_segment_errors_m=(0.1, 0.6, 0.3),
+)
 
 Pair = tuple[TickInputs, Tick]
 
@@ -106,6 +116,7 @@ def header(**changes: object) -> FlightHeader:
         "planner": "learned",
         "model_card": {"name": "crazyflie-flight", "hash": "0123abcd"},
         "predicted_max_error_m": 0.25,
+        "predictions": (PREDICTION,),
         **changes,
     }
     return FlightHeader(**values)  # type: ignore[arg-type]

@@ -9,7 +9,7 @@ import numpy as np
 from lcd_flight.mission.assemble import Planned, TrajectoryTask, flight_plan, trajectory_tasks
 from lcd_flight.mission.mission import Mission
 from lcd_flight.mission.path_checks import require_flyable
-from lcd_flight.model import FlightPlan, FloatArray, InputError, RefusedError, Vehicle
+from lcd_flight.model import FlightPlan, FloatArray, InputError, RefusedError, Trajectory, Vehicle
 from lcd_flight.planning.cost.model_card import ModelCard
 from lcd_flight.planning.cost.model_file import SUFFIX, check_fits, load_model, model_names
 from lcd_flight.planning.cost.tracking_cost import CostModel
@@ -42,6 +42,9 @@ class TrajectorySummary:
     minimum_snap_cost: float | None = None
     predicted_max_error_m: float | None = None
     minimum_snap_predicted_max_error_m: float | None = None
+    segment_errors_m: tuple[float, ...] | None = None
+    """Predicted for each segment of the plan; None where no learned cost was asked."""
+    minimum_snap_segment_errors_m: tuple[float, ...] | None = None
     fallback: str | None = None
     """Why minimum snap is flown though the mission asks for more."""
 
@@ -109,12 +112,13 @@ def _plan(
     task: TrajectoryTask, mission: Mission, vehicle: Vehicle, cost: TrackingCost | None
 ) -> tuple[Planned, TrajectorySummary]:
     """One trajectory, planned and summed up."""
+    place = mission.place("plan", task.item, "trajectory")
     if cost is None:
         plan = minimum_snap(task.waypoints, task.durations_s)
-        return Planned(plan, plan), _summary(task, mission, vehicle, Planned(plan, plan), None)
+        return Planned(plan, plan), _summary(task, vehicle, Planned(plan, plan), place)
     result = plan_task(task.waypoints, task.durations_s, cost, _options(task, mission, cost))
     planned = Planned(result.plans[0], result.minimum_snap[0])
-    return planned, _summary(task, mission, vehicle, planned, result)
+    return planned, _summary(task, vehicle, planned, place, cost, result)
 
 
 def _options(task: TrajectoryTask, mission: Mission, cost: TrackingCost) -> PlannerOptions:
@@ -130,12 +134,17 @@ def _card(cost: TrackingCost | None) -> ModelCard | None:
 
 
 def _summary(
-    task: TrajectoryTask, mission: Mission, vehicle: Vehicle, planned: Planned, result: PlanResult | None
+    task: TrajectoryTask,
+    vehicle: Vehicle,
+    planned: Planned,
+    place: str,
+    cost: TrackingCost | None = None,
+    result: PlanResult | None = None,
 ) -> TrajectorySummary:
     learned = result is not None and result.fallback[0] is None
     summary = TrajectorySummary(
         item=task.item,
-        place=mission.place("plan", task.item, "trajectory"),
+        place=place,
         waypoints=len(task.waypoints),
         length_m=float(np.linalg.norm(np.diff(task.waypoints[:, :3], axis=0), axis=1).sum()),
         duration_s=planned.trajectory.duration_s,
@@ -152,8 +161,18 @@ def _summary(
         minimum_snap_cost=_number(result.minimum_snap_cost),
         predicted_max_error_m=_number(result.predicted_max_error_m),
         minimum_snap_predicted_max_error_m=_number(result.minimum_snap_predicted_max_error_m),
+        segment_errors_m=_segment_errors_m(cost, planned.trajectory),
+        minimum_snap_segment_errors_m=_segment_errors_m(cost, planned.baseline),
         fallback=result.fallback[0],
     )
+
+
+def _segment_errors_m(cost: TrackingCost | None, plan: Trajectory) -> tuple[float, ...] | None:
+    """(S,) the largest error that a learned cost expects in each segment; None of another cost."""
+    if not isinstance(cost, CostModel):
+        return None
+    (errors_m,) = cost.predict_segment_errors_m(plan.durations_s[None], plan.coefficients[None])
+    return tuple(errors_m.tolist())
 
 
 def _number(row: FloatArray) -> float | None:

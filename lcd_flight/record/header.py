@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import importlib.metadata
-import os
-import platform
-import subprocess
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
-from pathlib import Path
 from typing import Any
 
 import msgspec
-import numpy as np
 
-from lcd_flight.model import FlightPlan, Leg, LegKind, SafetyLimits, Trajectory, Vehicle
-from lcd_flight.model.types import FloatArray
-from lcd_flight.record import codec
+from lcd_flight.model import FlightPlan, SafetyLimits, Vehicle
+from lcd_flight.record import codec, plan_file
+from lcd_flight.record.machine import this_machine
+from lcd_flight.record.plan_file import LegFile, Prediction
 
 LOG_SCHEMA = 1
 """Raised when a reader of the version before could misread a file."""
@@ -25,8 +20,11 @@ LOG_SCHEMA = 1
 PROFILE = "lcd-flight"
 """MCAP's word for what files have in common; ours is known by it."""
 
-MISSION, PLAN, VEHICLE, LIMITS, MODEL = "mission.yaml", "plan.json", "vehicle.json", "limits.json", "model_card.json"
-"""Names of the attachments."""
+MISSION, PLAN, VEHICLE, LIMITS = "mission.yaml", "plan.json", "vehicle.json", "limits.json"
+"""Names of the attachments that every log has."""
+
+PREDICTION, MODEL = "prediction.json", "model_card.json"
+"""Names of those that a log may lack."""
 
 FLIGHT, VERSIONS = "flight", "versions"
 """Names of the metadata records."""
@@ -54,33 +52,24 @@ class FlightHeader:
     """Of the planner's model; empty where it has none."""
     predicted_max_error_m: float | None = None
     """The rehearsal's, None where there was none."""
+    predictions: tuple[Prediction, ...] = ()
+    """The planner's, one for each trajectory of the mission, in order."""
     notes: Mapping[str, str] = field(default_factory=dict)
     """Anything else worth keeping, shown by the review as it stands."""
     versions: Mapping[str, str] = field(default_factory=dict)
     """Of programs, machine and commit; filled in by `this_machine` when a log is written."""
 
 
-@dataclass(frozen=True, slots=True)
-class _LegFile:
-    """A leg in `plan.json`: durations (S) in s, coefficients (4, S, 8) of x, y, z and yaw in ascending powers."""
-
-    kind: LegKind
-    durations_s: list[float]
-    coefficients: list[list[list[float]]]
-    settle: bool = False
-    waypoints: list[list[float]] | None = None
-    baseline_durations_s: list[float] | None = None
-    baseline_coefficients: list[list[list[float]]] | None = None
-
-
 def attachments(header: FlightHeader) -> dict[str, tuple[str, bytes]]:
     """Name to media type and content."""
     files = {
         MISSION: ("application/yaml", header.mission_text.encode()),
-        PLAN: ("application/json", _pretty(tuple(_leg_file(leg) for leg in header.plan.legs))),
+        PLAN: ("application/json", _pretty(plan_file.written(header.plan))),
         VEHICLE: ("application/json", _pretty(header.vehicle)),
         LIMITS: ("application/json", _pretty(header.limits)),
     }
+    if header.predictions:
+        files[PREDICTION] = ("application/json", _pretty(header.predictions))
     if header.model_card:
         files[MODEL] = ("application/json", _pretty(header.model_card))
     return files
@@ -114,7 +103,7 @@ def header_from(metadata_records: Mapping[str, Mapping[str, str]], files: Mappin
     return FlightHeader(
         name=flight.pop("name"),
         mission_text=files[MISSION].decode(),
-        plan=FlightPlan(tuple(_leg(leg) for leg in codec.decode(files[PLAN], list[_LegFile]))),
+        plan=plan_file.read(codec.decode(files[PLAN], list[LegFile])),
         vehicle=codec.decode(files[VEHICLE], Vehicle),
         limits=codec.decode(files[LIMITS], SafetyLimits),
         link=flight.pop("link"),
@@ -123,63 +112,10 @@ def header_from(metadata_records: Mapping[str, Mapping[str, str]], files: Mappin
         planner=flight.pop("planner"),
         model_card=msgspec.json.decode(files.get(MODEL, b"{}")),
         predicted_max_error_m=float(predicted) if predicted else None,
+        predictions=codec.decode(files.get(PREDICTION, b"[]"), tuple[Prediction, ...]),
         notes=flight,
         versions=dict(metadata_records.get(VERSIONS, {})),
     )
-
-
-def this_machine() -> dict[str, str]:
-    """What wrote the log, and where: versions, commit where it is known, machine."""
-    packages = ("lcd-flight", "numpy", "numba", "mcap", "pyzmq")
-    return {
-        **{name: importlib.metadata.version(name) for name in packages},
-        "commit": _commit(),
-        "python": platform.python_version(),
-        "system": platform.platform(),
-        "processors": f"{os.cpu_count()} x {platform.machine()}",
-        "host": platform.node(),
-    }
-
-
-def _commit() -> str:
-    """The commit that runs, with `-dirty` where files were changed; empty for an installed package or without git."""
-    root = Path(__file__).resolve().parents[2]
-    if not (root / ".git").exists():
-        return ""
-    command = ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
-    try:
-        return subprocess.run(command, capture_output=True, text=True, timeout=5.0, check=True).stdout.strip()  # noqa: S603
-    except (OSError, subprocess.SubprocessError):
-        return ""
-
-
-def _leg_file(leg: Leg) -> _LegFile:
-    return _LegFile(
-        kind=leg.kind,
-        durations_s=leg.trajectory.durations_s.tolist(),
-        coefficients=leg.trajectory.coefficients.tolist(),
-        settle=leg.settle,
-        waypoints=None if leg.waypoints is None else leg.waypoints.tolist(),
-        baseline_durations_s=None if leg.baseline is None else leg.baseline.durations_s.tolist(),
-        baseline_coefficients=None if leg.baseline is None else leg.baseline.coefficients.tolist(),
-    )
-
-
-def _leg(file: _LegFile) -> Leg:
-    baseline = None
-    if file.baseline_durations_s is not None and file.baseline_coefficients is not None:
-        baseline = Trajectory(_array(file.baseline_durations_s), _array(file.baseline_coefficients))
-    return Leg(
-        kind=file.kind,
-        trajectory=Trajectory(_array(file.durations_s), _array(file.coefficients)),
-        waypoints=None if file.waypoints is None else _array(file.waypoints),
-        settle=file.settle,
-        baseline=baseline,
-    )
-
-
-def _array(values: Any) -> FloatArray:
-    return np.asarray(values, dtype=np.float64)
 
 
 def _pretty(value: Any) -> bytes:

@@ -171,6 +171,7 @@ def test_the_description_comes_back(log: Path) -> None:
     for name in ("name", "mission_text", "vehicle", "limits", "link", "seed", "started", "planner", "model_card"):
         assert getattr(header, name) == getattr(expected, name), name
     assert header.predicted_max_error_m == 0.25
+    assert header.predictions == (synthetic_flight.PREDICTION,)
     assert {"lcd-flight", "python", "system", "commit"} <= set(header.versions)
     for leg, wanted in zip(header.plan.legs, expected.plan.legs, strict=True):
         assert (leg.kind, leg.settle) == (wanted.kind, wanted.settle)
@@ -184,11 +185,11 @@ def test_the_description_comes_back(log: Path) -> None:
 
 def test_what_a_flight_may_lack(tmp_path: Path, pairs: list[Pair]) -> None:
     header = synthetic_flight.header(
-        predicted_max_error_m=None, model_card={}, notes={"operator": "a <b>", "name": "x"}
+        predicted_max_error_m=None, predictions=(), model_card={}, notes={"operator": "a <b>", "name": "x"}
     )
     back = read_log(written(tmp_path / "bare.mcap", pairs[:1], header)).header
     assert back.predicted_max_error_m is None
-    assert back.model_card == {}
+    assert (back.model_card, back.predictions) == ({}, ())
     assert (back.notes["operator"], back.name) == ("a <b>", "four-waypoint test")
 
 
@@ -265,7 +266,14 @@ def test_a_stream_is_written_too_and_left_open(pairs: list[Pair]) -> None:
 def test_attachments_are_there_by_name(log: Path) -> None:
     with log.open("rb") as stream:
         files = {a.name: (a.media_type, a.data) for a in make_reader(stream).iter_attachments()}
-    assert set(files) == {"mission.yaml", "plan.json", "vehicle.json", "limits.json", "model_card.json"}
+    assert set(files) == {
+        "mission.yaml",
+        "plan.json",
+        "prediction.json",
+        "vehicle.json",
+        "limits.json",
+        "model_card.json",
+    }
     assert files["mission.yaml"] == ("application/yaml", b"version: 1\nname: four-waypoint test\n")
     legs = msgspec.json.decode(files["plan.json"][1])
     assert [leg["kind"] for leg in legs] == ["takeoff", "hold", "trajectory", "land"]

@@ -57,6 +57,7 @@ def test_minimum_snap_asks_no_cost() -> None:
     planned = plan_mission(planner(), VEHICLE, Unanswering())
     (summary,) = planned.summaries
     assert (summary.method, summary.fallback, summary.cost) == ("minimum-snap", None, None)
+    assert summary.segment_errors_m is None
     assert (summary.item, summary.place, summary.waypoints) == (1, "plan[1].trajectory", 4)
     assert summary.relative_snap == 1.0
     assert summary.peaks == summary.minimum_snap_peaks
@@ -77,6 +78,15 @@ def test_the_learned_planner_lowers_its_cost_and_keeps_waypoints_and_total_time(
     assert leg.baseline is not None
     assert np.abs(leg.baseline.waypoints() - leg.waypoints).max() < 1e-9
     assert np.abs(leg.baseline.durations_s - leg.trajectory.durations_s).max() > 0.01
+
+
+def test_a_learned_cost_tells_what_it_expects_of_each_segment() -> None:
+    (summary,) = plan_mission(planner(type="learned"), VEHICLE).summaries
+    assert summary.segment_errors_m is not None
+    assert summary.minimum_snap_segment_errors_m is not None
+    assert len(summary.segment_errors_m) == len(summary.minimum_snap_segment_errors_m) == 3
+    assert max(summary.segment_errors_m) == pytest.approx(summary.predicted_max_error_m)
+    assert max(summary.minimum_snap_segment_errors_m) == pytest.approx(summary.minimum_snap_predicted_max_error_m)
 
 
 def test_given_times_are_kept() -> None:

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lcd_flight.drawing.html import Html, tag
+from lcd_flight.drawing.scale import Axis, label, runs, visible
 from lcd_flight.model.types import FloatArray
-from lcd_flight.review.html import Html, tag
-from lcd_flight.review.scale import Axis, label, runs, visible
 
 WIDTH, HEIGHT = 2000, 1000
 """Of the drawing, in its own units: half a pixel of a large screen."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from lcd_flight.drawing.html import Html, tag
+from lcd_flight.drawing.scale import Axis, label
 from lcd_flight.model.types import FloatArray
 from lcd_flight.review.chart import HEIGHT, WIDTH, axis_marks
-from lcd_flight.review.html import Html, tag
-from lcd_flight.review.scale import Axis, label
 
 _BINS = 40
 _LEAST_MS = 0.2

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from lcd_flight.drawing import colors
+from lcd_flight.drawing.html import Html, joined, tag
 from lcd_flight.record import FlightLog
 from lcd_flight.review import sections
 from lcd_flight.review.assets import asset
 from lcd_flight.review.chart import Timeline, panel_html
 from lcd_flight.review.figures import FlightFigures, figures_of
 from lcd_flight.review.histogram import lateness_html
-from lcd_flight.review.html import Html, joined, tag
 from lcd_flight.review.plots import panels, timeline
 from lcd_flight.review.view import baselines, path_drawing
 
@@ -37,7 +38,7 @@ def page(log: FlightLog) -> Html:
         tag("meta", name_="viewport", content="width=device-width, initial-scale=1"),
         tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
         tag("title", f"{log.header.name}: flight report"),
-        tag("style", Html(asset("colors.css") + asset("space.css") + asset("page.css"))),
+        tag("style", Html(colors() + asset("space.css") + asset("page.css"))),
     )
     body = tag(
         "body",

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from lcd_flight.drawing import colors
+from lcd_flight.drawing.html import Html, tag
 from lcd_flight.record import FlightLog
 from lcd_flight.review.assets import asset
 from lcd_flight.review.figures import figures_of
-from lcd_flight.review.html import Html, tag
 from lcd_flight.review.view import HEIGHT, WIDTH, baselines, path_drawing
 
 _FOOT = 44
@@ -29,7 +30,7 @@ def path_figure(log: FlightLog) -> Html:
     size = {"width": WIDTH, "height": HEIGHT + _FOOT}
     return tag(
         "svg",
-        tag("style", Html(asset("colors.css") + asset("space.css") + ".paper { fill: var(--card); }")),
+        tag("style", Html(colors() + asset("space.css") + ".paper { fill: var(--card); }")),
         tag("rect", **size, rx=12, class_="paper"),
         path_drawing(log),
         tag("g", *_legend(log), class_="space", transform=f"translate(28,{HEIGHT + _FOOT // 2 - 4})"),

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from lcd_flight.drawing.scale import Axis, axis_around
 from lcd_flight.model import Severity
 from lcd_flight.model.types import BoolArray, FloatArray
 from lcd_flight.record import FlightLog, Series
 from lcd_flight.review.chart import Band, Chart, Flag, Panel, Rule, Timeline, Trace
-from lcd_flight.review.scale import Axis, axis_around
 from lcd_flight.review.spans import airborne, span_name, spans
 
 _BEFORE_TAKEOFF_S = 2.0

@@ -7,11 +7,11 @@ from typing import Any
 
 import msgspec
 
+from lcd_flight.drawing.html import Html, tag
+from lcd_flight.drawing.scale import MINUS
 from lcd_flight.model import Outcome, Severity
 from lcd_flight.record import FlightLog
 from lcd_flight.review.figures import FlightFigures
-from lcd_flight.review.html import Html, tag
-from lcd_flight.review.scale import MINUS
 
 _VERDICTS = {Outcome.LANDED: "good", Outcome.ABORTED: "warn", Outcome.CRASHED: "bad", Outcome.CUT: "bad"}
 _SEVERITIES = {Severity.INFO: "info", Severity.WARN: "warn"}

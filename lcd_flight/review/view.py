@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lcd_flight.drawing.html import Html, tag
 from lcd_flight.model import FlightPlan, Trajectory
 from lcd_flight.model.types import FloatArray
 from lcd_flight.record import FlightLog
-from lcd_flight.review.html import Html, tag
 from lcd_flight.review.spans import airborne
 
 WIDTH, HEIGHT = 1000, 640

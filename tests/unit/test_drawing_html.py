@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lcd_flight.review.html import Html, joined, tag
+from lcd_flight.drawing.html import Html, joined, tag
 
 
 def test_text_is_escaped_and_markup_is_not() -> None:

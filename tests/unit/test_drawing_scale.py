@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lcd_flight.review.scale import Axis, axis_around, label, runs, visible
+from lcd_flight.drawing.scale import Axis, axis_around, label, runs, visible
 
 
 @pytest.mark.parametrize(

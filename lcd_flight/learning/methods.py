@@ -24,7 +24,8 @@ from lcd_flight.planning.cost.model_file import check_fits, load_model
 from lcd_flight.planning.cost.proxy import ThrustProxy
 from lcd_flight.planning.knots import Whitening
 from lcd_flight.planning.minimum_snap import minimum_snap_batch
-from lcd_flight.planning.planner import PlannerOptions, Timing, TrackingCost, plan_batch
+from lcd_flight.planning.planner import PlannerOptions, PlanResult, Timing, TrackingCost, plan_batch
+from lcd_flight.planning.polish import Candidate, polish
 from lcd_flight.planning.search import Arena, SearchSettings
 from lcd_flight.planning.search import search as search_in_simulator
 from lcd_flight.worlds import fingerprint
@@ -57,6 +58,12 @@ class Problem:
         """(N, S) the paper's time allocation."""
         return self.tasks.durations_s(self.world.speed)
 
+    @property
+    def arena(self) -> Arena:
+        """Where a method that flies does so: the world that is planned for."""
+        options = RolloutOptions(loop=self.world.loop, start_aligned=self.world.start_aligned)
+        return Arena(self.simulator, self.vehicle, options)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Planned:
@@ -65,6 +72,8 @@ class Planned:
     plans: Trajectories
     fell_back: BoolArray
     """(N,) where the method failed and gave minimum snap instead."""
+    controller: str = "geometric"
+    """What the plans are flown by (`RolloutOptions.controller`)."""
 
 
 Method: TypeAlias = Callable[[Problem], Planned]
@@ -78,7 +87,7 @@ def minimum_snap(problem: Problem) -> Planned:
 
 def analytic(problem: Problem) -> Planned:
     """The projected solve on the analytic cost: no learning, no simulator."""
-    return _solved(problem, ThrustProxy(), PlannerOptions(problem.timing))
+    return _solved(_solve_analytic(problem))
 
 
 def learned(problem: Problem) -> Planned:
@@ -87,21 +96,17 @@ def learned(problem: Problem) -> Planned:
     Raises:
         InputError: the model is missing, damaged, or trained for another vehicle or loop.
     """
-    model = load_model(problem.model)
-    check_fits(model, fingerprint(problem.vehicle, problem.world.loop), problem.world.loop)
-    assert model.card is not None  # noqa: S101 - a loaded model has one
-    return _solved(problem, model, PlannerOptions(problem.timing, model.card.snap_weight))
+    return _solved(_solve(problem, *_learned_cost(problem)))
 
 
 def search(problem: Problem) -> Planned:
     """CEM in the simulator from minimum snap, 320 rollouts a task: what learning is held against."""
     space = Whitening.of(problem.tasks.poses, problem.durations_s)
-    options = RolloutOptions(loop=problem.world.loop, start_aligned=problem.world.start_aligned)
     found = search_in_simulator(
         space,
         np.zeros(space.z_shape),
         np.zeros(space.durations_s.shape),
-        Arena(problem.simulator, problem.vehicle, options),
+        problem.arena,
         seed=problem.seed,
         tasks=problem.indices,
         settings=SearchSettings() if problem.timing == "retimed" else SearchSettings(theta_sd=0.0),
@@ -109,15 +114,52 @@ def search(problem: Problem) -> Planned:
     return Planned(space.plan(found.z, found.theta), np.zeros(len(space), bool))
 
 
-def _solved(problem: Problem, cost: TrackingCost, options: PlannerOptions) -> Planned:
-    result = plan_batch(problem.tasks, problem.durations_s, cost, options)
+def learned_polished(problem: Problem) -> Planned:
+    """The best of learned, analytic and minimum snap by two flights each, then searched from.
+
+    Raises:
+        InputError: as `learned`.
+    """
+    return _polished(problem, [_solve(problem, *_learned_cost(problem)), _solve_analytic(problem)])
+
+
+def analytic_polished(problem: Problem) -> Planned:
+    """The same without learning: what the polish itself is worth."""
+    return _polished(problem, [_solve_analytic(problem)])
+
+
+def _learned_cost(problem: Problem) -> tuple[TrackingCost, PlannerOptions]:
+    model = load_model(problem.model)
+    check_fits(model, fingerprint(problem.vehicle, problem.world.loop), problem.world.loop)
+    assert model.card is not None  # noqa: S101 - a loaded model has one
+    return model, PlannerOptions(problem.timing, model.card.snap_weight)
+
+
+def _solve_analytic(problem: Problem) -> PlanResult:
+    return _solve(problem, ThrustProxy(), PlannerOptions(problem.timing))
+
+
+def _solve(problem: Problem, cost: TrackingCost, options: PlannerOptions) -> PlanResult:
+    return plan_batch(problem.tasks, problem.durations_s, cost, options)
+
+
+def _solved(result: PlanResult) -> Planned:
     return Planned(result.plans, np.array([reason is not None for reason in result.fallback]))
+
+
+def _polished(problem: Problem, solved: list[PlanResult]) -> Planned:
+    space = Whitening.of(problem.tasks.poses, problem.durations_s)
+    candidates = [Candidate(s.z, s.theta) for s in solved] + [Candidate.minimum_snap(space)]
+    result = polish(space, candidates, problem.arena, seed=problem.seed, tasks=problem.indices, timing=problem.timing)
+    return Planned(result.plans, _solved(solved[0]).fell_back)
 
 
 METHODS: dict[str, Method] = {
     "minimum-snap": minimum_snap,
     "analytic": analytic,
     "learned": learned,
+    "analytic-polished": analytic_polished,
+    "learned-polished": learned_polished,
     "search": search,
 }
 

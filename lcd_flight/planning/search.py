@@ -87,6 +87,10 @@ class Found:
     """(N, S)"""
     cost: FloatArray
     """(N,) `tracking_cost`, as flown then."""
+    mean_z: FloatArray
+    """(N, S - 1, 3, 4) what the populations came to be drawn around: under no noise's spell, but never flown."""
+    mean_theta: FloatArray
+    """(N, S)"""
 
 
 def search(
@@ -130,7 +134,13 @@ def search(
         best, lowest = _better(best, lowest, samples, generation.costs)
         if watch is not None:
             watch(generation)
-    return Found(best[:, :-segments].reshape(z.shape), best[:, -segments:], lowest)
+    return Found(
+        best[:, :-segments].reshape(z.shape),
+        best[:, -segments:],
+        lowest,
+        mean[:, :-segments].reshape(z.shape),
+        mean[:, -segments:],
+    )
 
 
 def tracking_cost(labels: RolloutLabels) -> FloatArray:

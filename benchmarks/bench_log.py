@@ -39,7 +39,8 @@ from lcd_flight.model import (
     Trajectory,
 )
 from lcd_flight.observers import LogThread
-from lcd_flight.record import FlightHeader, LogWriter, codec, topics, viewer
+from lcd_flight.record import FlightHeader, LogWriter, topics, viewer
+from lcd_flight.wire import json_records
 from lcd_flight.worlds import load_vehicle
 
 ROUNDS = 4
@@ -125,8 +126,8 @@ class _PlainWriter:
         assert inputs.pose.state is not None
         state, now_ns = inputs.pose.state, tick.now_ns
         for topic, data in (
-            (topics.TICK_INPUTS, codec.encode(inputs)),
-            (topics.TICK, codec.encode(tick)),
+            (topics.TICK_INPUTS, json_records.encode(inputs)),
+            (topics.TICK, json_records.encode(tick)),
             (topics.TRANSFORMS, viewer.transforms(now_ns, state).SerializeToString()),
             (topics.POSE, viewer.vehicle_pose(now_ns, state).SerializeToString()),
             (topics.REFERENCE, viewer.reference_pose(now_ns, tick.reference).SerializeToString()),

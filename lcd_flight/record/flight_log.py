@@ -100,7 +100,9 @@ class FlightLog:
     findings: tuple[TimedFinding, ...]
     """In the order of their beginning."""
     complete: bool
-    """False where the file was cut: the end of the flight may be missing."""
+    """False where the file was cut or damaged: the end of the flight may be missing."""
+    missing_ticks: int = 0
+    """How many are missing in between: there was no room to log them, or the file was damaged."""
 
 
 def series_of(pairs: Sequence[tuple[TickInputs, Tick]]) -> Series:
@@ -164,6 +166,11 @@ def findings_of(ticks: Sequence[Tick]) -> tuple[TimedFinding, ...]:
         end_s = time_s
     done.extend(TimedFinding(begin_s, end_s, finding) for begin_s, finding in open_now.values())
     return tuple(sorted(done, key=lambda stretch: stretch.begin_s))
+
+
+def missing_ticks(ticks: Sequence[Tick]) -> int:
+    """How many numbers the sequence of at least one tick leaves out."""
+    return ticks[-1].sequence - ticks[0].sequence + 1 - len(ticks)
 
 
 def _column(records: Sequence[object], name: str) -> FloatArray:

@@ -10,9 +10,10 @@ from typing import Any
 import msgspec
 
 from lcd_flight.model import FlightPlan, SafetyLimits, Vehicle
-from lcd_flight.record import codec, plan_file
+from lcd_flight.record import plan_file
 from lcd_flight.record.machine import this_machine
 from lcd_flight.record.plan_file import LegFile, Prediction
+from lcd_flight.wire import json_records
 
 LOG_SCHEMA = 1
 """Raised when a reader of the version before could misread a file."""
@@ -28,6 +29,9 @@ PREDICTION, MODEL = "prediction.json", "model_card.json"
 
 FLIGHT, VERSIONS = "flight", "versions"
 """Names of the metadata records."""
+
+RECOVERED = "recovered"
+"""Name of the metadata record that only `lcd recover` writes: the flight's end may be missing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -103,20 +107,20 @@ def header_from(metadata_records: Mapping[str, Mapping[str, str]], files: Mappin
     return FlightHeader(
         name=flight.pop("name"),
         mission_text=files[MISSION].decode(),
-        plan=plan_file.read(codec.decode(files[PLAN], list[LegFile])),
-        vehicle=codec.decode(files[VEHICLE], Vehicle),
-        limits=codec.decode(files[LIMITS], SafetyLimits),
+        plan=plan_file.read(json_records.decode(files[PLAN], list[LegFile])),
+        vehicle=json_records.decode(files[VEHICLE], Vehicle),
+        limits=json_records.decode(files[LIMITS], SafetyLimits),
         link=flight.pop("link"),
         seed=int(flight.pop("seed")),
         started=datetime.fromisoformat(flight.pop("started")),
         planner=flight.pop("planner"),
         model_card=msgspec.json.decode(files.get(MODEL, b"{}")),
         predicted_max_error_m=float(predicted) if predicted else None,
-        predictions=codec.decode(files.get(PREDICTION, b"[]"), tuple[Prediction, ...]),
+        predictions=json_records.decode(files.get(PREDICTION, b"[]"), tuple[Prediction, ...]),
         notes=flight,
         versions=dict(metadata_records.get(VERSIONS, {})),
     )
 
 
 def _pretty(value: Any) -> bytes:
-    return msgspec.json.format(codec.encode(value), indent=1)
+    return msgspec.json.format(json_records.encode(value), indent=1)

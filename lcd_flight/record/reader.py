@@ -2,45 +2,42 @@
 
 from __future__ import annotations
 
-import contextlib
-import struct
-from collections import defaultdict
+import gc
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO
 
 import msgspec
-import zstandard
-from mcap.exceptions import McapError
-from mcap.records import Attachment, Channel, Footer, Header, McapRecord, Message, Metadata
-from mcap.stream_reader import StreamReader
+from mcap.records import Attachment, Channel, Footer, Header, Message, Metadata
 from mcap.writer import MCAP0_MAGIC
 
 from lcd_flight.model import InputError, Tick, TickInputs
-from lcd_flight.record import codec
-from lcd_flight.record.flight_log import FlightLog, findings_of, series_of
-from lcd_flight.record.header import FLIGHT, LOG_SCHEMA, PROFILE, FlightHeader, header_from
+from lcd_flight.record.container import LostChunk, Record, records
+from lcd_flight.record.flight_log import FlightLog, findings_of, missing_ticks, series_of
+from lcd_flight.record.header import FLIGHT, LOG_SCHEMA, PROFILE, RECOVERED, FlightHeader, header_from
 from lcd_flight.record.topics import TICK, TICK_INPUTS
+from lcd_flight.wire import json_records
 
-_DAMAGE = (McapError, zstandard.ZstdError, struct.error, ValueError)
-"""What the MCAP library raises where a file was cut or altered (CRC and UTF-8 errors are ValueErrors)."""
-
-_LARGEST_RECORD_BYTES = 2**30
-"""A length above this is damage, not a record: it would only fill the memory."""
+Pair = tuple[TickInputs, Tick]
 
 
 @dataclass(slots=True)
 class _Content:
-    """What a file holds, undecoded."""
+    """What of a file makes a flight, undecoded."""
 
     header: Header | None = None
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     attachments: dict[str, bytes] = field(default_factory=dict)
     topics: dict[int, str] = field(default_factory=dict)
-    messages: dict[str, list[bytes]] = field(default_factory=lambda: defaultdict(list))
-    """By topic, in the order of the file."""
-    complete: bool = False
+    inputs: dict[int, bytes] = field(default_factory=dict)
+    """By sequence."""
+    ticks: dict[int, bytes] = field(default_factory=dict)
+    ended: bool = False
+    """Whether the file ends as it should."""
+    damaged: bool = False
+    """Whether a chunk was lost."""
 
 
 def read_log(path: Path) -> FlightLog:
@@ -49,70 +46,94 @@ def read_log(path: Path) -> FlightLog:
     Raises:
         InputError: it is no flight log, or not one that this version can read, or it holds no tick.
     """
-    header, ticks, complete = _read(path)
-    if not ticks:
+    content = _content_of(path)
+    header, pairs = _header(path, content), _pairs(path, content)
+    if not pairs:
         raise InputError(f"{path}: describes a flight but holds no tick: it ended before the first was written")
+    ticks = [tick for _, tick in pairs]
     return FlightLog(
         path=path,
         header=header,
-        series=series_of(ticks),
-        findings=findings_of([tick for _, tick in ticks]),
-        complete=complete,
+        series=series_of(pairs),
+        findings=findings_of(ticks),
+        complete=content.ended and not content.damaged and RECOVERED not in content.metadata,
+        missing_ticks=missing_ticks(ticks),
     )
 
 
-def read_ticks(path: Path) -> list[tuple[TickInputs, Tick]]:
-    """The records themselves, equal to the bit to those that were written.
+def read_ticks(path: Path) -> list[Pair]:
+    """The records themselves, equal to the bit to those that were written, in order.
+
+    Where ticks were dropped or a chunk was damaged, numbers are missing from the sequence.
 
     Raises:
         InputError: it is no flight log, or not one that this version can read.
     """
-    return _read(path)[1]
+    return read_flight(path)[1]
 
 
-def _read(path: Path) -> tuple[FlightHeader, list[tuple[TickInputs, Tick]], bool]:
-    """Header, ticks, and whether the file is whole."""
-    try:
-        with path.open("rb") as stream:
-            content = _content(path, stream)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    header = _header(path, content)
-    try:
-        # A tick whose inputs were flushed and which was itself cut off has no partner: zip ends before it.
-        inputs = [codec.decode(data, TickInputs) for data in content.messages[TICK_INPUTS.name]]
-        ticks = [codec.decode(data, Tick) for data in content.messages[TICK.name]]
-    except msgspec.MsgspecError as error:
-        raise InputError(f"{path}: a tick is not as this version of lcd-flight writes it: {error}") from error
-    return header, list(zip(inputs, ticks, strict=False)), content.complete
-
-
-def _content(path: Path, stream: IO[bytes]) -> _Content:
-    """All records up to the end, or to the first that is not whole.
+def read_flight(path: Path) -> tuple[FlightHeader, list[Pair]]:
+    """The flight's description and its ticks.
 
     Raises:
-        InputError: it does not even begin as MCAP.
+        InputError: it is no flight log, or not one that this version can read.
     """
-    beginning = stream.read(len(MCAP0_MAGIC))
-    if not beginning:
-        raise InputError(f"{path}: is empty")
-    if not MCAP0_MAGIC.startswith(beginning):
-        raise InputError(f"{path}: is not an MCAP file; flight logs end in .mcap")
-    stream.seek(0)
-    content = _Content()
-    with contextlib.suppress(*_DAMAGE):
-        for record in _records(stream):
+    content = _content_of(path)
+    return _header(path, content), _pairs(path, content)
+
+
+def read_header(path: Path) -> FlightHeader:
+    """The flight's description alone: reading ends at the first message.
+
+    Raises:
+        InputError: it is no flight log, or not one that this version can read.
+    """
+    with opened(path) as stream:
+        content = _Content()
+        for record in records(stream):
+            if isinstance(record, Message):
+                break
+            _take(content, record)
+    return _header(path, content)
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[IO[bytes]]:
+    """The file, from its beginning, once that was found to be MCAP's.
+
+    Raises:
+        InputError: it cannot be read, or does not even begin as MCAP.
+    """
+    try:
+        with path.open("rb") as stream:
+            beginning = stream.read(len(MCAP0_MAGIC))
+            if not beginning:
+                raise InputError(f"{path}: is empty")
+            if not MCAP0_MAGIC.startswith(beginning):
+                raise InputError(f"{path}: is not an MCAP file; flight logs end in .mcap")
+            stream.seek(0)
+            yield stream
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def _content_of(path: Path) -> _Content:
+    with opened(path) as stream:
+        content = _Content()
+        for record in records(stream):
             _take(content, record)
     return content
 
 
-def _records(stream: IO[bytes]) -> Iterator[McapRecord]:
-    return StreamReader(stream, validate_crcs=True, record_size_limit=_LARGEST_RECORD_BYTES).records
-
-
-def _take(content: _Content, record: McapRecord) -> None:
+def _take(content: _Content, record: Record) -> None:
     """Sort one record in."""
     match record:
+        case Message():
+            topic = content.topics[record.channel_id]
+            if topic == TICK.name:
+                content.ticks[record.sequence] = record.data
+            elif topic == TICK_INPUTS.name:
+                content.inputs[record.sequence] = record.data
         case Header():
             content.header = record
         case Metadata():
@@ -121,10 +142,34 @@ def _take(content: _Content, record: McapRecord) -> None:
             content.attachments[record.name] = record.data
         case Channel():
             content.topics[record.id] = record.topic
-        case Message():
-            content.messages[content.topics[record.channel_id]].append(record.data)
         case Footer():
-            content.complete = True
+            content.ended = True
+        case LostChunk():
+            content.damaged = True
+
+
+def _pairs(path: Path, content: _Content) -> list[Pair]:
+    """What each tick knew and decided; one that lost its partner to a cut is left out."""
+    whole = [(content.inputs[n], data) for n, data in content.ticks.items() if n in content.inputs]
+    try:
+        with _collector_resting():
+            return [
+                (json_records.decode(inputs, TickInputs), json_records.decode(tick, Tick)) for inputs, tick in whole
+            ]
+    except msgspec.MsgspecError as error:
+        raise InputError(f"{path}: a tick is not as this version of lcd-flight writes it: {error}") from error
+
+
+@contextmanager
+def _collector_resting() -> Iterator[None]:
+    """Records hold no cycles, and looking for some among millions of them would take twice as long as reading them."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collecting:
+            gc.enable()
 
 
 def _header(path: Path, content: _Content) -> FlightHeader:

@@ -1,7 +1,7 @@
 """What viewers draw with no set-up: our ticks as Foxglove's protobuf messages.
 
 Frames: `world` (z up) and `vehicle` (x forward, y left, z up). Nothing is read back from these messages; the exact
-record of a tick is the JSON of `codec`.
+record of a tick is the JSON of `lcd_flight.wire.json_records`.
 """
 
 from __future__ import annotations

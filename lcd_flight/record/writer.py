@@ -13,9 +13,10 @@ from google.protobuf.message import Message
 from mcap.writer import CompressionType, Writer
 
 from lcd_flight.model import Finding, MotorRequest, Phase, RefusedError, Tick, TickInputs
-from lcd_flight.record import codec, scene, topics, viewer
+from lcd_flight.record import scene, topics, viewer
 from lcd_flight.record.header import PROFILE, FlightHeader, attachments, metadata
 from lcd_flight.record.topics import TOPICS, Topic
+from lcd_flight.wire import json_records
 
 CHUNK_BYTES = 64 * 1024
 """Larger chunks stall whoever fills them up by milliseconds."""
@@ -70,8 +71,8 @@ class LogWriter:
         if self._flushed_ns is None:
             self._flushed_ns = now_ns
             self._set_scene(tick)
-        self._add(topics.TICK_INPUTS, codec.encode(inputs), tick)
-        self._add(topics.TICK, codec.encode(tick), tick)
+        self._add(topics.TICK_INPUTS, json_records.encode(inputs), tick)
+        self._add(topics.TICK, json_records.encode(tick), tick)
         self._draw(inputs, tick)
         self._tell(inputs, tick)
         if tick.motors in (MotorRequest.DISARM, MotorRequest.STOP):

@@ -15,9 +15,9 @@ from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from google.protobuf.descriptor_pool import DescriptorPool
 
 from lcd_flight.model import LinkReport, PoseReport, Reference, State, Tick, TickInputs
-from lcd_flight.record import codec
 from lcd_flight.record.schema import json_schema
 from lcd_flight.record.topics import TICK, TICK_INPUTS, TOPICS, Topic
+from lcd_flight.wire import json_records
 
 PROTOBUF = [topic for topic in TOPICS if topic.encoding == "protobuf"]
 
@@ -83,7 +83,7 @@ def test_ticks_are_what_the_schemas_say() -> None:
     validators = [jsonschema.Draft202012Validator(strict(json_schema(record))) for record in (TickInputs, Tick)]
     for pair in synthetic_flight.flight()[::50]:
         for validator, record in zip(validators, pair, strict=True):
-            validator.validate(json.loads(codec.encode(record)))
+            validator.validate(json.loads(json_records.encode(record)))
 
 
 @pytest.mark.parametrize("topic", PROTOBUF, ids=lambda topic: topic.name)

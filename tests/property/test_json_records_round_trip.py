@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lcd_flight.model import Tick, TickInputs
-from lcd_flight.record import codec
+from lcd_flight.wire import json_records
 
 st.register_type_strategy(int, st.integers(-(2**63), 2**63 - 1))
 
@@ -27,10 +27,10 @@ def bits(value: Any) -> Any:
 @settings(deadline=None, max_examples=150)
 @given(st.from_type(TickInputs))
 def test_inputs(inputs: TickInputs) -> None:
-    assert bits(codec.decode(codec.encode(inputs), TickInputs)) == bits(inputs)
+    assert bits(json_records.decode(json_records.encode(inputs), TickInputs)) == bits(inputs)
 
 
 @settings(deadline=None, max_examples=150)
 @given(st.from_type(Tick))
 def test_ticks(tick: Tick) -> None:
-    assert bits(codec.decode(codec.encode(tick), Tick)) == bits(tick)
+    assert bits(json_records.decode(json_records.encode(tick), Tick)) == bits(tick)

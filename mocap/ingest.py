@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lcd_flight.model import Clock, InputError, PoseOptions, PoseReport
+from lcd_flight.model import Clock, InputError, PoseListener, PoseOptions, PoseReport
 from lcd_flight.wire.mocap_frame import decode, topic
 from mocap.pose_filter import FilterState, PoseFilter
 
@@ -23,6 +23,11 @@ class Ingestor:
         self._clock = clock
         self._filter = PoseFilter(options)
         self._state = FilterState()
+        self._listeners: list[PoseListener] = []
+
+    def listen(self, listener: PoseListener) -> None:
+        """Tell `listener` of every accepted frame from now on."""
+        self._listeners.append(listener)
 
     def receive(self, data: bytes) -> None:
         """Take in one message that has just arrived; whatever it is, it raises nothing."""
@@ -31,7 +36,12 @@ class Ingestor:
         except ValueError as error:
             self._state = self._filter.malformed(self._state, str(error))
         else:
+            before = self._state.accepted
             self._state = self._filter.step(self._state, frame, self._clock.now_ns())
+            accepted = self._state.accepted
+            if accepted is not None and accepted is not before:
+                for listener in self._listeners:
+                    listener(accepted)
 
     def report(self, now_ns: int) -> PoseReport:
         """The filtered pose brought forward to `now_ns`, and the health of the source."""

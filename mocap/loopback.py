@@ -8,7 +8,7 @@ from __future__ import annotations
 from types import TracebackType
 from typing import Self
 
-from lcd_flight.model import Clock, PoseOptions, PoseReport, RefusedError
+from lcd_flight.model import Clock, PoseListener, PoseOptions, PoseReport, RefusedError
 from mocap.ingest import Ingestor
 
 _listeners: dict[str, list[Ingestor]] = {}
@@ -54,6 +54,10 @@ class LoopbackSource:
     def report(self, now_ns: int) -> PoseReport:
         """The filtered pose brought forward to `now_ns`."""
         return self._ingestor.report(now_ns)
+
+    def listen(self, listener: PoseListener) -> None:
+        """Tell `listener` of every accepted frame from now on, as it arrives."""
+        self._ingestor.listen(listener)
 
 
 class LoopbackPublisher:

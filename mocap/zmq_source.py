@@ -14,7 +14,7 @@ from typing import Self
 
 import zmq
 
-from lcd_flight.model import Clock, PoseOptions, PoseReport
+from lcd_flight.model import Clock, PoseListener, PoseOptions, PoseReport
 from mocap.endpoints import checked, refusal
 from mocap.ingest import Ingestor
 
@@ -77,6 +77,10 @@ class ZmqSource:
         """Drain what has arrived, and the filtered pose brought forward to `now_ns`."""
         self._drain()
         return self._ingestor.report(now_ns)
+
+    def listen(self, listener: PoseListener) -> None:
+        """Tell `listener` of every accepted frame from now on, as it arrives."""
+        self._ingestor.listen(listener)
 
     def _drain(self) -> None:
         """Take all that has arrived; of a flood, a part now and the next at the following report."""

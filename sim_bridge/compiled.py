@@ -11,7 +11,12 @@ from lcd_flight.jit import Compiler
 from sim_bridge.kernels import plant, rollout
 
 _HOUSE = Path(lcd_flight.__file__).parent
-SOURCES = (Path(__file__).parent / "kernels", _HOUSE / "control", _HOUSE / "model" / "types.py")
+SOURCES = (
+    Path(__file__).parent / "kernels",
+    _HOUSE / "control",
+    _HOUSE / "model" / "types.py",
+    _HOUSE / "model" / "frames.py",
+)
 """All that kernels may be made of; a test holds them to it."""
 
 

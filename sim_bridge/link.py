@@ -79,8 +79,7 @@ class SimulatedLink:
         self._camera = Camera(
             context.rigid_body, context.seed, options.noise_mm, options.noise_deg, twist=options.twist
         )
-        battery_V = context.battery_V if options.battery_V is None else options.battery_V
-        self._vehicle = SimulatedVehicle(context, battery_V)
+        self._vehicle = SimulatedVehicle(context, options.battery_V)
         self._task: asyncio.Task[None] | None = None
         self._open = False
         self._armed_ns: int | None = None

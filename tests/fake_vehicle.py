@@ -7,7 +7,7 @@ from typing import Self
 
 from flight_bench import PointMass, healthy
 
-from lcd_flight.model import AttitudeThrust, Clock, LinkReport, PoseReport, RefusedError
+from lcd_flight.model import AttitudeThrust, Clock, LinkReport, PoseListener, PoseReport, RefusedError
 
 
 class FakeVehicle:
@@ -99,3 +99,6 @@ class FakePose:
         if now_ns < self.from_ns:
             return PoseReport(state=None, age_ns=None)
         return healthy(now_ns // 10_000_000, self.vehicle.body.state, now_ns).pose
+
+    def listen(self, listener: PoseListener) -> None:
+        """Nobody asks it."""

@@ -7,7 +7,7 @@ import socket
 from contextlib import suppress
 from typing import Self
 
-from lcd_flight.model import Clock, InputError, PoseOptions, PoseReport, RefusedError
+from lcd_flight.model import Clock, InputError, PoseListener, PoseOptions, PoseReport, RefusedError
 from mocap.ingest import Ingestor
 
 
@@ -53,6 +53,10 @@ class UdpSource:
     def report(self, now_ns: int) -> PoseReport:
         """The filtered pose brought forward to `now_ns`."""
         return self._ingestor.report(now_ns)
+
+    def listen(self, listener: PoseListener) -> None:
+        """Tell `listener` of every accepted frame from now on, as it arrives."""
+        self._ingestor.listen(listener)
 
     def _drain(self) -> None:
         """As soon as frames arrive, so that they are stamped then."""

@@ -139,6 +139,8 @@ async def _opened(
         seed=mission.seed,
         publish_pose=publisher,
         rigid_body=capture.rigid_body,
+        listen_poses=pose.listen,
+        on_link_lost=mission.safety.on_link_lost,
     )
     return pose, await stack.enter_async_context(open_link(uri, context))
 

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from lcd_flight.mission.keys import Keys, Point, Real, Switch, Whole, Word
+from lcd_flight.model import LinkLossPolicy
 
 Volts = Annotated[Real, Field(gt=0.0, le=100.0)]
 Fault = Literal["motor_noise", "mocap_dropout"]
@@ -118,8 +119,9 @@ class Safety(Keys):
     """Refuse to fly if the rehearsal's 95th percentile exceeds it."""
     on_mocap_lost: Literal["land", "cut"] = "land"
     """Level descent without pose, or stop the motors."""
-    on_link_lost: Literal["cut"] = "cut"
-    """Without the link the vehicle's own watchdog acts; kept for links that let it be chosen, none does yet."""
+    on_link_lost: LinkLossPolicy = "vehicle"
+    """What the vehicle does by itself without the link: what its firmware does by default, or stop the motors within
+    1 s."""
     on_battery_critical: Literal["land", "warn"] = "land"
     """Land at once, or warn only."""
     confirm: Switch = True

@@ -10,6 +10,7 @@ from lcd_flight.model.ports import (
     Link,
     LinkContext,
     Observer,
+    PoseListener,
     PoseOptions,
     PosePublisher,
     PoseSource,
@@ -18,7 +19,7 @@ from lcd_flight.model.ports import (
 )
 from lcd_flight.model.rollout import CRASH_ERROR_M, RolloutLabels
 from lcd_flight.model.state import AttitudeThrust, Reference, State
-from lcd_flight.model.telemetry import LinkReport, PoseReport, RawPose, Telemetry
+from lcd_flight.model.telemetry import LinkReport, PoseReport, RawPose, Telemetry, Transmission
 from lcd_flight.model.tick import Command, MotorRequest, Tick, TickInputs
 from lcd_flight.model.trajectory import COEFFICIENTS, Trajectories, Trajectory
 from lcd_flight.model.types import (
@@ -26,6 +27,7 @@ from lcd_flight.model.types import (
     BoolArray,
     FloatArray,
     IntArray,
+    LinkLossPolicy,
     Loop,
     MocapAxes,
     Quaternion,
@@ -55,6 +57,7 @@ __all__ = [
     "LegKind",
     "Link",
     "LinkContext",
+    "LinkLossPolicy",
     "LinkReport",
     "Loop",
     "MocapAxes",
@@ -64,6 +67,7 @@ __all__ = [
     "Outcome",
     "Phase",
     "PidGains",
+    "PoseListener",
     "PoseOptions",
     "PosePublisher",
     "PoseReport",
@@ -86,6 +90,7 @@ __all__ = [
     "TickInputs",
     "Trajectories",
     "Trajectory",
+    "Transmission",
     "Vector3",
     "Vehicle",
     "World",

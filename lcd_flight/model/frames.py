@@ -67,6 +67,26 @@ def yaw_of(q_WB: Quaternion) -> float:
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
+def body_x_axis(q_WB: Quaternion) -> Vector3:
+    """Where the nose points, R_WB e1, in the world."""
+    x, y, z, w = q_WB
+    return (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y))
+
+
+def seen_from_heading(axis_W: Vector3, nose_W: Vector3) -> tuple[float, float]:
+    """Forward and left component of a vector, for a vehicle whose nose points along `nose_W`; tilt does not matter.
+
+    Firmware that corrects roll, pitch and yaw apart is told roll and pitch of the desired thrust axis as seen from the
+    heading that the vehicle has: those of the desired attitude itself would point the thrust astray by as much as the
+    heading lags behind.
+    """
+    ahead_x, ahead_y = nose_W[0], nose_W[1]
+    size = math.sqrt(ahead_x * ahead_x + ahead_y * ahead_y)
+    scale = 1.0 / size if size > 0.0 else 0.0
+    x, y = axis_W[0], axis_W[1]
+    return scale * (ahead_x * x + ahead_y * y), scale * (ahead_x * y - ahead_y * x)
+
+
 def tilt_of(q_WB: Quaternion) -> float:
     """Angle between the body z axis and the vertical, in rad, in [0, pi]."""
     return math.acos(max(-1.0, min(1.0, body_z_axis(q_WB)[2])))

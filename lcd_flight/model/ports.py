@@ -9,10 +9,10 @@ from typing import Protocol, Self
 
 from lcd_flight.model.rollout import RolloutLabels
 from lcd_flight.model.state import AttitudeThrust
-from lcd_flight.model.telemetry import LinkReport, PoseReport
+from lcd_flight.model.telemetry import LinkReport, PoseReport, RawPose
 from lcd_flight.model.tick import Tick, TickInputs
 from lcd_flight.model.trajectory import Trajectories
-from lcd_flight.model.types import FloatArray, Loop, MocapAxes, SeedArray, Vector3
+from lcd_flight.model.types import FloatArray, LinkLossPolicy, Loop, MocapAxes, SeedArray, Vector3
 from lcd_flight.model.vehicle import Vehicle
 
 
@@ -28,6 +28,10 @@ class Clock(Protocol):
         ...
 
 
+PoseListener = Callable[[RawPose], None]
+"""Who is told of every accepted frame as it arrives, in the event loop."""
+
+
 @dataclass(frozen=True, slots=True)
 class LinkContext:
     """What a link is given besides its URI."""
@@ -37,12 +41,15 @@ class LinkContext:
     initial_position_m: Vector3
     initial_yaw_rad: float
     seed: int
-    battery_V: float | None = None
-    """Voltage that a simulated vehicle starts with; None: full."""
     publish_pose: Callable[[bytes], None] | None = None
     """Where a simulated vehicle publishes its pose, as mocap frames (`lcd_flight.wire.mocap_frame`)."""
     rigid_body: str = "vehicle"
     """The name under which it does."""
+    listen_poses: Callable[[PoseListener], None] | None = None
+    """`PoseSource.listen` of the flight's motion capture, for links that tell their vehicle where it is; None: there
+    is no motion capture."""
+    on_link_lost: LinkLossPolicy = "vehicle"
+    """What the vehicle is to do by itself once it hears nothing any more; set before take-off."""
 
 
 class Link(Protocol):
@@ -114,6 +121,10 @@ class PoseSource(Protocol):
 
     def report(self, now_ns: int) -> PoseReport:
         """Drain what has arrived, and the filtered pose brought forward to `now_ns`."""
+        ...
+
+    def listen(self, listener: PoseListener) -> None:
+        """Tell `listener` of every accepted frame from now on, as it arrives."""
         ...
 
 

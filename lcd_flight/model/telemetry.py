@@ -19,12 +19,26 @@ class Telemetry:
     airborne: bool | None = None
     crashed: bool | None = None
     """Tumbled, locked or otherwise out of our hands."""
+    status: int | None = None
+    """Status word as the vehicle sent it; what its bits mean stands in the documentation of the link."""
     q_WB: Quaternion | None = None
     """Onboard attitude estimate."""
+    p_WB: Vector3 | None = None
+    """Onboard position estimate in m."""
     motor_shares: tuple[float, ...] | None = None
     """Motor commands as shares of full scale, 0 to 1."""
     messages: tuple[str, ...] = ()
     """Text that arrived since the last report."""
+
+
+@dataclass(frozen=True, slots=True)
+class Transmission:
+    """One packet that went to the vehicle."""
+
+    stamp_ns: int
+    """Host's monotonic time at which it was handed to the driver."""
+    packet: str
+    """Its bytes, hexadecimal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +57,10 @@ class LinkReport:
     """Lost packets as a share, over the last second."""
     fallback_active: bool = False
     """Whether the link is flying its own fallback for want of a fresh setpoint."""
+    quality: float | None = None
+    """Share of radio packets that were acknowledged without being repeated, where there is a radio."""
+    transmitted: tuple[Transmission, ...] = ()
+    """Setpoints that went out since the last report, byte for byte, where the link can tell."""
     telemetry: Telemetry | None = None
 
 

@@ -24,6 +24,9 @@ SeedArray: TypeAlias = NDArray[np.uint64]
 Loop: TypeAlias = Literal["paper", "flight"]
 """`paper`: the SE(3) law to rotor speeds. `flight`: collective thrust and attitude to an onboard PID."""
 
+LinkLossPolicy: TypeAlias = Literal["vehicle", "cut"]
+"""Once a vehicle hears nothing any more: `vehicle`: what its firmware does by default; `cut`: motors off within 1 s."""
+
 GRAVITY_M_PER_S2 = 9.81
 
 MocapAxes: TypeAlias = Literal["enu", "ned", "y_up"]

@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 from lcd_flight.control.geometric import Rotation, Row4, clipped
 from lcd_flight.model import PidGains, Vector3, Vehicle
+from lcd_flight.model.frames import seen_from_heading
 from sim_bridge.kernels.elementary import arctan2
 
 FULL_SCALE = 65535.0
@@ -149,14 +150,11 @@ def roll_pitch_yaw(R_WB: Rotation) -> Vector3:
 def tilt_and_heading(R_WD: Rotation, R_WB: Rotation) -> Vector3:
     """Roll, pitch and yaw setpoint in deg for the attitude R_WD of a vehicle that has R_WB.
 
-    The firmware corrects the three angles apart. Roll and pitch of R_WD itself would point the thrust astray by as much
-    as the heading lags behind; these point it along R_WD's b3 at the heading that the vehicle has.
+    The firmware corrects the three angles apart: roll and pitch point the thrust along R_WD's b3 at the heading that
+    the vehicle has (`seen_from_heading`).
     """
-    ahead_x, ahead_y = R_WB[0][0], R_WB[0][1]
-    size = math.sqrt(ahead_x * ahead_x + ahead_y * ahead_y)
-    scale = 1.0 / size if size > 0.0 else 0.0
-    x, y, z = R_WD[2]
-    forward, left = scale * (ahead_x * x + ahead_y * y), scale * (ahead_x * y - ahead_y * x)
+    forward, left = seen_from_heading(R_WD[2], R_WB[0])
+    z = R_WD[2][2]
     return (
         DEGREES * arctan2(-left, math.sqrt(forward * forward + z * z)),
         DEGREES * arctan2(forward, z),

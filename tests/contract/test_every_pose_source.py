@@ -19,7 +19,7 @@ import pytest
 
 from lcd_flight import plugins
 from lcd_flight.flight.clock import RealClock
-from lcd_flight.model import InputError, PoseOptions, PosePublisher, PoseReport, PoseSource, RefusedError
+from lcd_flight.model import InputError, PoseOptions, PosePublisher, PoseReport, PoseSource, RawPose, RefusedError
 from lcd_flight.wire.mocap_frame import MocapFrame, encode
 
 CLOCK = RealClock()
@@ -94,6 +94,23 @@ async def connected(endpoint: str, options: PoseOptions | None = None) -> AsyncI
 @pytest.fixture(params=["tcp", "ipc", "loopback"])
 def endpoint(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     return free_endpoint(request.param, tmp_path)
+
+
+def test_listeners_hear_of_every_accepted_frame_and_of_no_other(endpoint: str) -> None:
+    async def main() -> None:
+        async with connected(endpoint) as pair:
+            await pair.until(lambda r: r.state is not None)
+            heard: list[RawPose] = []
+            pair.source.listen(heard.append)
+            began = pair.report()
+            pair.send(position=(90.0, 0.0, 0.0))
+            for _ in range(5):
+                pair.send()
+            ended = await pair.until(lambda r: r.received >= began.received + 6, sending=False)
+            assert [raw.sequence for raw in heard] == [pair.sent - n for n in range(5, 0, -1)]
+            assert heard[-1] == ended.raw
+
+    asyncio.run(main())
 
 
 def test_frames_become_a_filtered_pose(endpoint: str) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from lcd_flight.control.geometric import rotation_of
-from lcd_flight.model import AttitudeThrust, State, Vehicle
+from lcd_flight.model import AttitudeThrust, State, Vector3, Vehicle
 from sim_bridge.battery import Battery
 from sim_bridge.compiled import plant_kernel
 from sim_bridge.craft import craft_of
@@ -78,6 +78,15 @@ class Plant:
         given = received(setpoint.thrust_N, rotation_of(setpoint.q_WB), R_WB, self._craft.onboard)
         self._memory[rows.SETPOINT * LANES] = given.thrust
         store3(self._memory, rows.SETPOINT + 1, 0, given.attitude)
+
+    def command(self, counts: float, attitude_deg: Vector3) -> None:
+        """Give the onboard controller its own numbers, past `setpoint`: thrust counts; roll, pitch, yaw in deg.
+
+        They are those of `kernels.onboard`: angles of the body frame, 0 counts stop the motors. Not checked.
+        """
+        if not self.crashed:
+            self._memory[rows.SETPOINT * LANES] = counts
+            store3(self._memory, rows.SETPOINT + 1, 0, attitude_deg)
 
     def stop(self) -> None:
         """Stop the motors; a later setpoint starts them again."""

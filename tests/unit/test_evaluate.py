@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from lcd_flight.learning import methods
-from lcd_flight.learning.evaluate import EvaluationOptions, evaluate
+from lcd_flight.learning.evaluate import evaluate
+from lcd_flight.learning.evaluation import EvaluationOptions
 from lcd_flight.learning.methods import Planned, Problem
 from lcd_flight.learning.sampling import first_tasks
 from lcd_flight.model import InputError, RolloutLabels, Tasks, TaskSampler, World
@@ -63,7 +64,7 @@ def test_rates_and_errors_by_hand():
 def test_a_rollout_that_left_the_models_validity_is_a_crash():
     run = evaluate(WORLD, ["minimum-snap"], tasks_with_errors([0.1, 0.2, 0.3, 0.4]), KnownSimulator(broken_from=0.25))
     assert run.methods["minimum-snap"].crash_rate == pytest.approx(50.0)
-    assert run.runs["minimum-snap"].crashed.tolist() == [[False] * 3] * 2 + [[True] * 3] * 2
+    assert run.runs["minimum-snap"].crashed.tolist() == [[[False] * 3]] * 2 + [[[True] * 3]] * 2
 
 
 def test_one_task_has_no_standard_error():
@@ -98,14 +99,14 @@ def test_methods_share_tasks_and_noise_whatever_the_chunks(stiff, monkeypatch):
     monkeypatch.setattr("lcd_flight.learning.evaluate._CHUNK", 2)
     again = KnownSimulator()
     pieces = evaluate(WORLD, ["minimum-snap", "stiff"], 7, again, EvaluationOptions(seed=4))
-    assert np.array_equal(np.concatenate([c[2] for c in again.calls[:4]]), seeds)
+    assert np.array_equal(again.calls[0][2], seeds)
     assert np.array_equal(pieces.runs["stiff"].max_error_m, run.runs["stiff"].max_error_m)
     assert np.array_equal(pieces.runs["stiff"].fell_back, run.runs["stiff"].fell_back)
 
 
 def test_the_drag_and_the_number_of_noise_seeds_are_options():
     simulator = KnownSimulator()
-    options = EvaluationOptions(drag=5, noise_seeds=2)
+    options = EvaluationOptions(drags=(5,), noise_seeds=2)
     assert evaluate(WORLD, ["minimum-snap"], 4, simulator, options).methods["minimum-snap"].noise_seeds == 2
     assert simulator.calls[0][1] == WORLD.vehicle(5)
 
@@ -135,7 +136,7 @@ def test_the_json_table():
 def test_progress_tells_each_method():
     seen = []
     evaluate(WORLD, ["minimum-snap"], 5, KnownSimulator(), progress=seen.append)
-    assert [(p.done, p.total, p.unit, p.note) for p in seen] == [(5, 5, "tasks", "minimum-snap")]
+    assert [(p.done, p.total, p.unit, p.note) for p in seen] == [(5, 5, "plans", "crazyflie-saturated minimum-snap")]
 
 
 def test_an_unknown_method_is_named_before_any_work():
@@ -147,7 +148,7 @@ def test_an_unknown_method_is_named_before_any_work():
 
 def test_a_world_without_that_drag_configuration_says_so():
     with pytest.raises(InputError, match="drag configuration 6"):
-        evaluate(WORLD, ["minimum-snap"], 5, KnownSimulator(), EvaluationOptions(drag=6))
+        evaluate(WORLD, ["minimum-snap"], 5, KnownSimulator(), EvaluationOptions(drags=(6,)))
 
 
 def test_tasks_of_any_number_of_waypoints():

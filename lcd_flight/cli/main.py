@@ -11,7 +11,7 @@ from pathlib import Path
 import typer
 from typer.exceptions import TyperException
 
-from lcd_flight.cli import bench, evaluation, fly, learning, mission, review
+from lcd_flight.cli import bench, evaluation, fly, learning, mission, recover, review
 from lcd_flight.cli.terminal import Terminal
 from lcd_flight.errors import LcdError, Outcome
 
@@ -32,6 +32,7 @@ app.command("collect")(learning.collect)
 app.command("train")(learning.train)
 app.command("evaluate")(evaluation.evaluate)
 app.command("review")(review.review)
+app.command("recover")(recover.recover)
 app.command("bench")(bench.bench)
 
 flyer = typer.Typer(

@@ -129,7 +129,7 @@ def _take(content: _Content, record: Record) -> None:
     """Sort one record in."""
     match record:
         case Message():
-            topic = content.topics[record.channel_id]
+            topic = content.topics.get(record.channel_id)
             if topic == TICK.name:
                 content.ticks[record.sequence] = record.data
             elif topic == TICK_INPUTS.name:

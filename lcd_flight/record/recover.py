@@ -16,7 +16,7 @@ from lcd_flight.model import InputError, RefusedError
 from lcd_flight.record.container import Cut, LostChunk, Record, records
 from lcd_flight.record.header import RECOVERED
 from lcd_flight.record.reader import opened, read_header
-from lcd_flight.record.topics import TICK
+from lcd_flight.record.topics import TICK, TICK_INPUTS
 from lcd_flight.record.writer import CHUNK_BYTES
 
 Advance = Callable[[int], object]
@@ -63,19 +63,22 @@ def condition(path: Path) -> Condition:
         InputError: it is no flight log, or its description is lost.
     """
     read_header(path)
-    ticks: list[tuple[int, int]] = []
-    tick_channels, lost_chunks, cut = set(), 0, False
+    topics: dict[int, str] = {}
+    stamps: dict[str, dict[int, int]] = {TICK.name: {}, TICK_INPUTS.name: {}}
+    lost_chunks, cut = 0, False
     with opened(path) as stream:
         for record in records(stream):
             match record:
-                case Message() if record.channel_id in tick_channels:
-                    ticks.append((record.sequence, record.log_time))
-                case Channel() if record.topic == TICK.name:
-                    tick_channels.add(record.id)
+                case Message() if topics.get(record.channel_id) in stamps:
+                    stamps[topics[record.channel_id]][record.sequence] = record.log_time
+                case Channel():
+                    topics[record.id] = record.topic
                 case LostChunk():
                     lost_chunks += 1
                 case Cut():
                     cut = True
+    # A chunk may end between what a tick knew and what it decided.
+    ticks = [(n, stamp_ns) for n, stamp_ns in stamps[TICK.name].items() if n in stamps[TICK_INPUTS.name]]
     if not ticks:
         return Condition(0, 0.0, 0, lost_chunks, cut)
     (first, first_ns), (last, last_ns) = ticks[0], ticks[-1]

@@ -84,7 +84,7 @@ def test_a_damaged_chunk_is_left_out_and_told(whole: Path, tmp_path: Path) -> No
     assert 0 < found.missing_ticks <= 50
     new = tmp_path / "new.mcap"
     recover(damaged, new, found.lost)
-    assert topics(new)["/tick"] == found.ticks
+    assert len(read_ticks(new)) == found.ticks
     assert read_log(new).missing_ticks == found.missing_ticks
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from lcd_flight.api import FlightOptions, FlownMission, PreparedFlight, fly, plan, rehearse
+    from lcd_flight.api import FlightOptions, FlownMission, PreparedFlight, fly, plan, rehearse, save_plan
 
-__all__ = ["FlightOptions", "FlownMission", "PreparedFlight", "fly", "plan", "rehearse"]
+__all__ = ["FlightOptions", "FlownMission", "PreparedFlight", "fly", "plan", "rehearse", "save_plan"]
 
 
 def __getattr__(name: str) -> Any:

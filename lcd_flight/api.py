@@ -15,7 +15,7 @@ For example:
 from __future__ import annotations
 
 import datetime
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,7 +25,11 @@ from lcd_flight.flight.result import FlightResult
 from lcd_flight.flight.session import FlightOptions, run_flight
 from lcd_flight.mission import Mission, load_mission
 from lcd_flight.mission.airframe import vehicle_of
-from lcd_flight.mission.plan_mission import PlannedMission, plan_mission
+from lcd_flight.mission.plan_cache import PlanCache
+from lcd_flight.mission.plan_csv import planned_from_csv
+from lcd_flight.mission.plan_file import planned_from_file, write_plan
+from lcd_flight.mission.plan_mission import plan_mission
+from lcd_flight.mission.planned import PlannedMission
 from lcd_flight.model import LegKind, RefusedError, Vehicle
 from lcd_flight.observers.log_thread import LogStatistics, LogThread
 from lcd_flight.record import FlightHeader, LogWriter, Prediction, log_path, read_log
@@ -34,7 +38,7 @@ from lcd_flight.rehearsal.verdict import Rehearsal
 from lcd_flight.review.figures import FlightFigures, figures_of
 from lcd_flight.review.page import write_page
 
-__all__ = ["FlightOptions", "FlownMission", "PreparedFlight", "fly", "plan", "rehearse"]
+__all__ = ["FlightOptions", "FlownMission", "PreparedFlight", "fly", "plan", "rehearse", "save_plan"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,16 +61,42 @@ class FlownMission:
     report: Path
 
 
-def plan(mission: Mission | str | Path) -> PreparedFlight:
+def plan(
+    mission: Mission | str | Path,
+    *,
+    plan_file: Path | None = None,
+    csv_files: Sequence[Path] = (),
+    cache: bool = True,
+) -> PreparedFlight:
     """Plan a mission, given as it is, by file, or by the name of one that ships.
 
+    plan_file: fly the plan in this file (`save_plan`) in place of planning.
+    csv_files: fly the polynomials in these files, one for each trajectory, in place of planning.
+    cache: whether plans are kept, and taken where they were made before.
+
     Raises:
-        InputError: the mission or its model is wrong; every problem of the file, a line each.
+        InputError: the mission, its model or the plan's file is wrong; every problem of the mission's file, a line
+            each.
         RefusedError: the planned path leaves the fence, breaks the planner's limits or outlasts the battery.
     """
     loaded = mission if isinstance(mission, Mission) else load_mission(mission)
     vehicle = vehicle_of(loaded)
-    return PreparedFlight(loaded, vehicle, plan_mission(loaded, vehicle))
+    if plan_file is not None:
+        planned = planned_from_file(plan_file, loaded, vehicle)
+    elif csv_files:
+        planned = planned_from_csv(csv_files, loaded, vehicle)
+    else:
+        planned = plan_mission(loaded, vehicle, cache=PlanCache() if cache else None)
+    return PreparedFlight(loaded, vehicle, planned)
+
+
+def save_plan(flight: PreparedFlight, path: Path) -> None:
+    """Write the plan to a file that `plan(mission, plan_file=path)` and `lcd-fly MISSION --plan PATH` take.
+
+    Raises:
+        InputError: the place cannot be written to.
+    """
+    write_plan(path, flight.planned, flight.mission, flight.vehicle)
 
 
 def rehearse(
@@ -135,12 +165,17 @@ def _header(
         link=options.uri or mission.vehicle.uri,
         seed=mission.seed,
         started=started,
-        planner=mission.planner.type,
+        planner=flight.planned.methods if flight.planned.source else mission.planner.type,
         model_card={} if card is None else card.model_dump(mode="json"),
         predicted_max_error_m=rehearsal.max_error_m,
         predictions=_predictions(flight.planned),
-        notes={"rehearsal": rehearsal.text},
+        notes={"rehearsal": rehearsal.text, **_plan_note(flight.planned)},
     )
+
+
+def _plan_note(planned: PlannedMission) -> dict[str, str]:
+    """That a plan was not made for this flight."""
+    return {"plan": f"from {planned.source}"} if planned.source else {}
 
 
 def _predictions(planned: PlannedMission) -> tuple[Prediction, ...]:

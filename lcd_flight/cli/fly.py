@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from lcd_flight.cli.mission import MissionArgument, plan_facts, tell_plan
+from lcd_flight.cli.mission import MissionArgument
 from lcd_flight.cli.options import Json, NoColor, Quiet
+from lcd_flight.cli.plan import NoCache, PlanFile
+from lcd_flight.cli.plan_display import plan_facts, tell_plan
 from lcd_flight.cli.terminal import Terminal
 from lcd_flight.errors import InputError, Outcome
 
@@ -25,6 +27,8 @@ def fly(
     link: Annotated[str | None, typer.Option(help="Link URI in place of the mission's.")] = None,
     fast: Annotated[bool, typer.Option("--fast", help="In virtual time, on the simulator only.")] = False,
     no_arm: Annotated[bool, typer.Option("--no-arm", help="Everything but the motors.")] = False,
+    plan_file: PlanFile = None,
+    no_cache: NoCache = False,
     plan_only: Annotated[bool, typer.Option("--plan-only", help="Stop after the rehearsal.")] = False,
     rehearse: Annotated[int | None, typer.Option(help="Runs of the rehearsal.", min=1, max=10_000)] = None,
     yes: Annotated[bool, typer.Option("--yes", help="Arm without asking.")] = False,
@@ -47,7 +51,7 @@ def fly(
     terminal.announce_compilation()
     loaded = load_mission(mission)
     options = _options(terminal, loaded, "sim://" if sim else link, fast=fast, arm=not no_arm, yes=yes)
-    flight = tell_plan(terminal, loaded)
+    flight = tell_plan(terminal, loaded, plan_file=plan_file, cache=not no_cache)
     rehearsal = _rehearse(terminal, flight, rehearse)
     facts = {"predicted_max_error_m": rehearsal.max_error_m, "log": None, "report": None}
     if not rehearsal.passed:

@@ -11,7 +11,7 @@ from pathlib import Path
 import typer
 from typer.exceptions import TyperException
 
-from lcd_flight.cli import bench, evaluation, fly, learning, mission, recover, review
+from lcd_flight.cli import bench, evaluation, fly, learning, mission, plan, recover, replay, review
 from lcd_flight.cli.terminal import Terminal
 from lcd_flight.errors import LcdError, Outcome
 
@@ -27,11 +27,12 @@ app = typer.Typer(
 )
 app.command("fly")(fly.fly)
 app.command("check")(mission.check)
-app.command("plan")(mission.plan)
+app.command("plan")(plan.plan)
 app.command("collect")(learning.collect)
 app.command("train")(learning.train)
 app.command("evaluate")(evaluation.evaluate)
 app.command("review")(review.review)
+app.command("replay")(replay.replay)
 app.command("recover")(recover.recover)
 app.command("bench")(bench.bench)
 

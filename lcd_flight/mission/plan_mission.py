@@ -2,94 +2,44 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, replace
 
 import numpy as np
 
-from lcd_flight.mission.assemble import Planned, TrajectoryTask, flight_plan, trajectory_tasks
+from lcd_flight.mission.assemble import TrajectoryTask, trajectory_tasks
 from lcd_flight.mission.mission import Mission
-from lcd_flight.mission.path_checks import require_flyable
-from lcd_flight.model import FlightPlan, FloatArray, InputError, RefusedError, Trajectory, Vehicle
+from lcd_flight.mission.plan_cache import PlanCache
+from lcd_flight.mission.plan_key import model_hash, plan_key
+from lcd_flight.mission.planned import PlannedMission, planned_mission
+from lcd_flight.mission.solution import MINIMUM_SNAP, ModelStamp, Predictions, Solution
+from lcd_flight.model import FloatArray, InputError, Trajectory, Vehicle
 from lcd_flight.planning.cost.model_card import ModelCard
 from lcd_flight.planning.cost.model_file import SUFFIX, check_fits, load_model, model_names
 from lcd_flight.planning.cost.tracking_cost import CostModel
-from lcd_flight.planning.limits import Peaks, peaks
 from lcd_flight.planning.minimum_snap import minimum_snap
 from lcd_flight.planning.planner import PlannerOptions, PlanResult, Timing, TrackingCost, plan_task
 from lcd_flight.worlds import fingerprint
 
 
-@dataclass(frozen=True, slots=True)
-class TrajectorySummary:
-    """What planning made of one trajectory, beside minimum snap through the same waypoints."""
-
-    item: int
-    """Which item of the mission's plan."""
-    place: str
-    """The same, for messages: `missions/x.yaml:20: plan[2].trajectory`."""
-    waypoints: int
-    length_m: float
-    """Along straight lines between the waypoints."""
-    duration_s: float
-    method: str
-    """`learned` or `minimum-snap`: what will be flown."""
-    peaks: Peaks
-    minimum_snap_peaks: Peaks
-    relative_snap: float = 1.0
-    """Snap of the position over the least possible."""
-    cost: float | None = None
-    """Tracking cost of the plan; None where no cost was asked."""
-    minimum_snap_cost: float | None = None
-    predicted_max_error_m: float | None = None
-    minimum_snap_predicted_max_error_m: float | None = None
-    segment_errors_m: tuple[float, ...] | None = None
-    """Predicted for each segment of the plan; None where no learned cost was asked."""
-    minimum_snap_segment_errors_m: tuple[float, ...] | None = None
-    fallback: str | None = None
-    """Why minimum snap is flown though the mission asks for more."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PlannedMission:
-    """A flight that keeps to the mission's limits; not rehearsed yet."""
-
-    plan: FlightPlan
-    summaries: tuple[TrajectorySummary, ...]
-    """One for each trajectory of the mission, in order."""
-    card: ModelCard | None = None
-    """Of the learned cost, where one was used."""
-
-
-def plan_mission(mission: Mission, vehicle: Vehicle, cost: TrackingCost | None = None) -> PlannedMission:
+def plan_mission(
+    mission: Mission, vehicle: Vehicle, cost: TrackingCost | None = None, cache: PlanCache | None = None
+) -> PlannedMission:
     """Plan every trajectory of `mission` for `vehicle` (`vehicle_of(mission)`), and the ways between.
 
     cost: in place of the model that the mission names; without effect for `planner.type: minimum-snap`.
+    cache: where plans made with a learned cost are looked for and kept; None: nowhere.
 
     Raises:
         InputError: the model is missing, damaged, or made for another vehicle or loop.
         RefusedError: the planned path leaves the geofence, breaks `planner.limits` or outlasts the battery.
     """
     tasks = trajectory_tasks(mission)
-    if mission.planner.type == "minimum-snap":
+    if mission.planner.type == MINIMUM_SNAP:
         cost = None
     elif cost is None and tasks:
         cost = load_cost(mission, vehicle)
-    made = [_plan(task, mission, vehicle, cost) for task in tasks]
-    plan = flight_plan(mission, [planned for planned, _ in made])
-    summaries = tuple(summary for _, summary in made)
-    _require_flyable(plan, mission, vehicle, summaries)
-    return PlannedMission(plan, summaries, _card(cost))
-
-
-def _require_flyable(
-    plan: FlightPlan, mission: Mission, vehicle: Vehicle, summaries: tuple[TrajectorySummary, ...]
-) -> None:
-    """As `require_flyable`; says, too, which trajectories are minimum snap though more was asked for."""
-    try:
-        require_flyable(plan, mission, vehicle)
-    except RefusedError as error:
-        fallen = [f"{s.place}: the learned plan was not used: {s.fallback}" for s in summaries if s.fallback]
-        raise RefusedError("\n".join([str(error), *fallen])) from error
+    solutions = [_solution(task, mission, vehicle, cost, cache) for task in tasks]
+    return planned_mission(mission, vehicle, solutions, _card(cost), cache.notes if cache else ())
 
 
 def load_cost(mission: Mission, vehicle: Vehicle) -> CostModel:
@@ -108,17 +58,21 @@ def load_cost(mission: Mission, vehicle: Vehicle) -> CostModel:
     return model
 
 
-def _plan(
-    task: TrajectoryTask, mission: Mission, vehicle: Vehicle, cost: TrackingCost | None
-) -> tuple[Planned, TrajectorySummary]:
-    """One trajectory, planned and summed up."""
-    place = mission.place("plan", task.item, "trajectory")
+def _solution(
+    task: TrajectoryTask, mission: Mission, vehicle: Vehicle, cost: TrackingCost | None, cache: PlanCache | None
+) -> Solution:
+    """One trajectory: minimum snap, from the cache, or solved and kept there."""
     if cost is None:
-        plan = minimum_snap(task.waypoints, task.durations_s)
-        return Planned(plan, plan), _summary(task, vehicle, Planned(plan, plan), place)
-    result = plan_task(task.waypoints, task.durations_s, cost, _options(task, mission, cost))
-    planned = Planned(result.plans[0], result.minimum_snap[0])
-    return planned, _summary(task, vehicle, planned, place, cost, result)
+        return Solution(minimum_snap(task.waypoints, task.durations_s), MINIMUM_SNAP)
+    method, options, model = mission.planner.type, _options(task, mission, cost), _stamp(cost)
+    if cache is None or model is None:
+        return _solved(task, method, cost, options)
+    key = plan_key(task, vehicle, method, asdict(options), model.hash)
+    found = cache.get(key, task)
+    if found is None:
+        found = _solved(task, method, cost, options)
+        cache.put(key, task, found)
+    return found
 
 
 def _options(task: TrajectoryTask, mission: Mission, cost: TrackingCost) -> PlannerOptions:
@@ -133,41 +87,38 @@ def _card(cost: TrackingCost | None) -> ModelCard | None:
     return cost.card if isinstance(cost, CostModel) else None
 
 
-def _summary(
-    task: TrajectoryTask,
-    vehicle: Vehicle,
-    planned: Planned,
-    place: str,
-    cost: TrackingCost | None = None,
-    result: PlanResult | None = None,
-) -> TrajectorySummary:
-    learned = result is not None and result.fallback[0] is None
-    summary = TrajectorySummary(
-        item=task.item,
-        place=place,
-        waypoints=len(task.waypoints),
-        length_m=float(np.linalg.norm(np.diff(task.waypoints[:, :3], axis=0), axis=1).sum()),
-        duration_s=planned.trajectory.duration_s,
-        method="learned" if learned else "minimum-snap",
-        peaks=peaks(planned.trajectory, vehicle),
-        minimum_snap_peaks=peaks(planned.baseline, vehicle),
+def _stamp(cost: TrackingCost) -> ModelStamp | None:
+    """Which model it is; None of a cost that is no model."""
+    if not isinstance(cost, CostModel):
+        return None
+    return ModelStamp(cost.card.name if cost.card else "unnamed", model_hash(cost))
+
+
+def _solved(task: TrajectoryTask, method: str, cost: TrackingCost, options: PlannerOptions) -> Solution:
+    result = plan_task(task.waypoints, task.durations_s, cost, options)
+    fallback = result.fallback[0]
+    return Solution(
+        trajectory=result.plans[0],
+        method=method if fallback is None else MINIMUM_SNAP,
+        fallback=fallback,
+        options=asdict(options),
+        model=_stamp(cost),
+        predictions=_predictions(cost, result),
     )
-    if result is None:
-        return summary
-    return replace(
-        summary,
-        relative_snap=float(result.relative_snap[0]),
+
+
+def _predictions(cost: TrackingCost, result: PlanResult) -> Predictions:
+    return Predictions(
         cost=_number(result.cost),
         minimum_snap_cost=_number(result.minimum_snap_cost),
         predicted_max_error_m=_number(result.predicted_max_error_m),
         minimum_snap_predicted_max_error_m=_number(result.minimum_snap_predicted_max_error_m),
-        segment_errors_m=_segment_errors_m(cost, planned.trajectory),
-        minimum_snap_segment_errors_m=_segment_errors_m(cost, planned.baseline),
-        fallback=result.fallback[0],
+        segment_errors_m=_segment_errors_m(cost, result.plans[0]),
+        minimum_snap_segment_errors_m=_segment_errors_m(cost, result.minimum_snap[0]),
     )
 
 
-def _segment_errors_m(cost: TrackingCost | None, plan: Trajectory) -> tuple[float, ...] | None:
+def _segment_errors_m(cost: TrackingCost, plan: Trajectory) -> tuple[float, ...] | None:
     """(S,) the largest error that a learned cost expects in each segment; None of another cost."""
     if not isinstance(cost, CostModel):
         return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -36,3 +37,25 @@ def write_text(path: Path, text: str) -> None:
     """
     with writing(path) as partial:
         partial.write_text(text, encoding="utf-8")
+
+
+def write_durably(path: Path, content: bytes | memoryview) -> None:
+    """Write bytes that outlast a power cut once this returns.
+
+    Raises:
+        InputError: it cannot be written, or the disk is full.
+    """
+    with writing(path) as partial, partial.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    _synchronise(path.parent)
+
+
+def _synchronise(folder: Path) -> None:
+    """Make new names in it last."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

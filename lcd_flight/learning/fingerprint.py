@@ -6,6 +6,7 @@ import hashlib
 import json
 import platform
 from dataclasses import asdict
+from functools import cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -38,6 +39,17 @@ def differences(here: Description, there: Description) -> list[str]:
 def versions(*distributions: str) -> dict[str, str]:
     """Versions of this project, Python and the distributions named, for cards and metadata."""
     return {"python": platform.python_version(), **{d: version(d) for d in ("lcd-flight", *distributions)}}
+
+
+@cache
+def origin() -> Description:
+    """What flies rollouts in this process: versions, and the processor that its kernels are compiled for.
+
+    The same versions give the same bytes on processors of one family.
+    """
+    from llvmlite.binding import get_host_cpu_name
+
+    return {"versions": versions("numpy", "numba"), "processor": get_host_cpu_name()}
 
 
 def _leaves(value: Any, path: str = "") -> list[tuple[str, Any]]:

@@ -44,6 +44,11 @@ class Meter:
         self._done = already_done
         self._began_s = time.monotonic()
 
+    def begin(self, already_done: int) -> None:
+        """So much was found done; the rate counts from now."""
+        self._first = self._done = already_done
+        self._began_s = time.monotonic()
+
     def advance(self, count: int, note: str = "") -> None:
         """So much more is done."""
         self._done += count

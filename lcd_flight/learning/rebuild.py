@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from lcd_flight.learning.rollouts import Plans
 from lcd_flight.learning.sources import training_tasks, whitening
+from lcd_flight.learning.spread import cores
 from lcd_flight.model import FloatArray, Trajectories, World
 from lcd_flight.planning.cost.features import segment_features
 from lcd_flight.planning.knots import Whitening
@@ -19,8 +19,9 @@ _ROWS_AT_A_TIME = 2048
 
 def variables(world: World, seed: int, plans: Plans) -> Whitening:
     """The planner's variables for each row's task."""
-    task, row_task = np.unique(plans.task, return_inverse=True)
-    return whitening(training_tasks(world.sampler, seed, task), world.speed).take(row_task)
+    key, row_key = np.unique(2 * plans.task + plans.short_yaw, return_inverse=True)
+    tasks = training_tasks(world.sampler, seed, key // 2, key % 2 == 1)
+    return whitening(tasks, world.speed).take(row_key)
 
 
 def trajectories(world: World, seed: int, plans: Plans) -> Trajectories:
@@ -41,5 +42,5 @@ def features(plans: Trajectories) -> FloatArray:
 def in_slices(part: Callable[[slice], FloatArray], rows: int) -> list[FloatArray]:
     """What `part` gives for slices of the rows, in order; it must release the interpreter's lock to gain from this."""
     slices = [slice(i, min(i + _ROWS_AT_A_TIME, rows)) for i in range(0, rows, _ROWS_AT_A_TIME)]
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         return list(pool.map(part, slices))

@@ -8,7 +8,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from lcd_flight.model import IntArray, RolloutLabels, SeedArray
+from lcd_flight.model import BoolArray, IntArray, RolloutLabels, SeedArray
 
 Float32Array = NDArray[np.float32]
 
@@ -22,8 +22,10 @@ class Source(IntEnum):
     """Minimum snap, perturbed in the whitened free variables."""
     SEARCH = 2
     """A sample of a search in the simulator."""
-    POLICY = 3
-    """A plan of the model in training, or a jitter around one."""
+    GIVEN = 3
+    """A given plan (in the training's rounds that of the model so far), or a jitter around one."""
+    TIMES = 4
+    """Minimum snap for times that are not the paper's."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,6 +37,8 @@ class Plans:
 
     task: IntArray
     """(N,) global index of the task."""
+    short_yaw: BoolArray
+    """(N,) whether the task turns by the short way rather than as sampled."""
     source: IntArray
     """(N,) values of `Source`."""
     z: Float32Array

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from lcd_flight.model import FloatArray, InputError, Tasks
+from lcd_flight.learning.npz import read_array, read_arrays
+from lcd_flight.model import InputError, Tasks
 from lcd_flight.planning.times import SAME_POINT
 
 
@@ -18,9 +17,9 @@ def load_tasks(path: Path) -> Tasks:
     Raises:
         InputError: one line that names the file, the array, what is wrong and what it should be.
     """
-    arrays = _arrays(path)
-    waypoints = _array(path, arrays, "waypoints", "(N, K, 3) in m", dimensions=3)
-    yaws = _array(path, arrays, "yaws", "(N, K) in rad", dimensions=2)
+    arrays = read_arrays(path, "`waypoints` and `yaws`")
+    waypoints = read_array(path, arrays, "waypoints", "(N, K, 3) in m", dimensions=3)
+    yaws = read_array(path, arrays, "yaws", "(N, K) in rad", dimensions=2)
     if waypoints.shape[2] != 3 or waypoints.shape[1] < 2 or not len(waypoints):
         raise InputError(f"{path}: waypoints has shape {waypoints.shape}; give (N, K, 3), N tasks of K >= 2 waypoints")
     if yaws.shape != waypoints.shape[:2]:
@@ -43,30 +42,3 @@ def save_tasks(path: Path, tasks: Tasks) -> None:
             np.savez(file, waypoints=tasks.waypoints_m, yaws=tasks.yaws_rad)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error})") from error
-
-
-def _arrays(path: Path) -> dict[str, Any]:
-    """All arrays of the file; none is unpickled."""
-    try:
-        loaded = np.load(path, allow_pickle=False)
-        if isinstance(loaded, np.ndarray):
-            raise InputError(f"{path}: one bare array; save `waypoints` and `yaws` together with numpy.savez")
-        with loaded as archive:
-            return {name: archive[name] for name in archive.files}
-    except FileNotFoundError as error:
-        raise InputError(f"{path}: no such file") from error
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: not a NumPy .npz file of plain arrays ({error})") from error
-
-
-def _array(path: Path, arrays: dict[str, Any], name: str, wanted: str, dimensions: int) -> FloatArray:
-    if name not in arrays:
-        found = ", ".join(arrays) or "nothing"
-        raise InputError(f"{path}: has no array `{name}` {wanted}; it holds {found}")
-    array = arrays[name]
-    if array.ndim != dimensions or array.dtype.kind not in "fiu":
-        raise InputError(f"{path}: {name} is {array.dtype} of shape {array.shape}; give numbers, {wanted}")
-    if not np.isfinite(array).all():
-        place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise InputError(f"{path}: {name}{list(place)} is {array[place]}; give finite numbers")
-    return np.asarray(array, dtype=np.float64)

@@ -8,7 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from lcd_flight.model import FloatArray, InputError, RolloutLabels, RolloutOptions, SeedArray, Trajectories, Vehicle
+from lcd_flight.model import (
+    FloatArray,
+    InputError,
+    RolloutLabels,
+    RolloutOptions,
+    SeedArray,
+    Trajectories,
+    Trajectory,
+    Vehicle,
+)
+from lcd_flight.model.rollout import FlownPath
 from sim_bridge.compiled import rollout_kernel
 from sim_bridge.craft import craft_of
 from sim_bridge.kernels import rows
@@ -34,6 +44,20 @@ class MultirotorSimulator:
             InputError: a plan that is not finite, a controller or loop that this simulator does not know.
         """
         return labels_of(fly(plans, vehicle, seeds, options))
+
+    def path(self, plan: Trajectory, vehicle: Vehicle, seed: int, options: RolloutOptions) -> FlownPath:
+        """Fly one plan as `rollout` would and tell where it went.
+
+        Raises:
+            InputError: as `rollout`.
+        """
+        from sim_bridge.trace import trace
+
+        flown = trace(plan, vehicle, seed, options)
+        x, y, z, w = flown.q_WB.T
+        yaw = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+        turns = np.round((plan.coefficients[3, 0, 0] - yaw[0]) / (2.0 * np.pi))
+        return FlownPath(flown.times_s, flown.p_WB, yaw + 2.0 * np.pi * turns)
 
 
 def fly(plans: Trajectories, vehicle: Vehicle, seeds: SeedArray, options: RolloutOptions, ticks: int = 0) -> Results:

@@ -64,3 +64,15 @@ class RolloutLabels:
     def concatenate(parts: list[RolloutLabels]) -> RolloutLabels:
         """Batches of the same segment count, one after another."""
         return RolloutLabels(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(RolloutLabels)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlownPath:
+    """Where one rollout went, tick by tick of 10 ms, up to its end or to where it left the model's validity."""
+
+    times_s: FloatArray
+    """(T,) from the start of the plan."""
+    p_WB: FloatArray
+    """(T, 3) m"""
+    yaw_rad: FloatArray
+    """(T,) unwrapped, from the yaw of the plan's first waypoint on."""

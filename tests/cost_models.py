@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import tracking_cost_torch as reference
 
 from lcd_flight.planning.cost.features import FEATURE_NAMES, segment_features
+from lcd_flight.planning.cost.inputs import INPUTS, InputsName
 from lcd_flight.planning.cost.model_card import ModelCard
 from lcd_flight.planning.cost.network import Activation, Network
 from lcd_flight.planning.cost.tracking_cost import CostModel, training_range
@@ -34,6 +37,26 @@ def random_model(
     features = segment_features(*reference.random_plans(200, 3, seed=99))
     mean, spread = features.mean(axis=(0, 1)), features.std(axis=(0, 1))
     return CostModel(Network.of(*reference.stacked(peers), activation), mean, spread, *training_range(features))
+
+
+def random_whole_model(inputs: InputsName, seed: int = 0, segments: int = 3, *, convex: bool = False) -> CostModel:
+    """Random float64 weights on inputs that show whole trajectories, normalised on random plans."""
+    raw = INPUTS[inputs].features(*reference.random_plans(200, segments, seed=99))
+    mean, spread = raw.mean(axis=(0, 1)), np.maximum(raw.std(axis=(0, 1)), 1e-3)
+    network = random_network((raw.shape[2], 16, 8), "elu", seed, convex=convex)
+    return CostModel(network, mean, spread, *training_range(raw), INPUTS[inputs])
+
+
+def random_network(widths: tuple[int, ...], activation: Activation, seed: int, *, convex: bool) -> Network:
+    """Two members of random weights; a convex one has skips and no negative weight between its layers."""
+    rng = np.random.default_rng(seed)
+    pairs = list(pairwise((*widths, 1)))
+    weights = [rng.normal(size=(2, a, b)) / np.sqrt(a) for a, b in pairs]
+    biases = [rng.normal(size=(2, b)) for _, b in pairs]
+    if not convex:
+        return Network.of(weights, biases, activation)
+    skips = [rng.normal(size=(2, widths[0], b)) / np.sqrt(widths[0]) for _, b in pairs[1:]]
+    return Network.of([weights[0], *(np.abs(w) for w in weights[1:])], biases, activation, skips)
 
 
 def thrust_model(threshold: float = 0.0) -> CostModel:

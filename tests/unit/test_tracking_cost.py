@@ -12,8 +12,11 @@ import torch
 import tracking_cost_torch as reference
 
 from lcd_flight.planning.cost.features import FEATURE_NAMES, segment_features
+from lcd_flight.planning.cost.inputs import INPUTS
 from lcd_flight.planning.cost.network import ACTIVATIONS, Activation, Network
-from lcd_flight.planning.cost.tracking_cost import training_range, windows, windows_pullback
+from lcd_flight.planning.cost.tracking_cost import training_range
+
+WINDOWS = INPUTS["windows"]
 
 
 @pytest.fixture(autouse=True)
@@ -68,7 +71,7 @@ def test_gradients_are_slopes() -> None:
 
 def test_windows_hold_neighbours_and_flags() -> None:
     normalised = np.arange(2 * 3 * 4, dtype=float).reshape(2, 3, 4) + 1.0
-    got = windows(normalised)
+    got = WINDOWS.arrange(normalised)
     assert got.shape == (2, 3, 14)
     assert np.all(got[:, 0, :4] == 0.0)
     assert np.array_equal(got[:, 1, :4], normalised[:, 0])
@@ -79,15 +82,17 @@ def test_windows_hold_neighbours_and_flags() -> None:
 
 
 def test_the_only_segment_is_first_and_last() -> None:
-    assert windows(np.ones((1, 1, 2)))[0, 0].tolist() == [0, 0, 1, 1, 0, 0, 1, 1]
+    assert WINDOWS.arrange(np.ones((1, 1, 2)))[0, 0].tolist() == [0, 0, 1, 1, 0, 0, 1, 1]
 
 
 @pytest.mark.parametrize("segments", [1, 2, 5])
 def test_windows_pullback_is_the_adjoint(segments: int) -> None:
     rng = np.random.default_rng(7)
     x, grad = rng.normal(size=(3, segments, 4)), rng.normal(size=(3, segments, 14))
-    flags = windows(np.zeros_like(x))
-    assert (windows(x) - flags).ravel() @ grad.ravel() == pytest.approx(x.ravel() @ windows_pullback(grad).ravel())
+    flags = WINDOWS.arrange(np.zeros_like(x))
+    assert (WINDOWS.arrange(x) - flags).ravel() @ grad.ravel() == pytest.approx(
+        x.ravel() @ WINDOWS.arrange_pullback(grad).ravel()
+    )
 
 
 def test_large_batches_give_what_small_ones_give_to_the_bit() -> None:

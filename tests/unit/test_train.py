@@ -17,8 +17,8 @@ from lcd_flight.learning.rollouts import Source
 from lcd_flight.learning.train import train
 from lcd_flight.learning.training_set import trains
 from lcd_flight.model import InputError
+from lcd_flight.planning.cost.inputs import INPUTS
 from lcd_flight.planning.cost.model_file import check_fits, load_model
-from lcd_flight.planning.cost.tracking_cost import windows
 from lcd_flight.plugins import simulator
 from lcd_flight.worlds import fingerprint, load_world
 
@@ -139,7 +139,7 @@ def test_the_split_is_by_task():
 @pytest.mark.parametrize("segments", [1, 2, 5])
 def test_windows_are_those_of_planning(segments):
     features = np.random.default_rng(0).normal(size=(4, segments, 7)).astype(np.float32)
-    assert np.array_equal(windows_of(torch.from_numpy(features)).numpy(), windows(features))
+    assert np.array_equal(windows_of(torch.from_numpy(features)).numpy(), INPUTS["windows"].arrange(features))
 
 
 def test_one_network_serves_one_vehicle_and_one_loop():

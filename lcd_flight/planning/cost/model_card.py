@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Literal, TypeAlias
+
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from lcd_flight.model import Loop, Vector3
+
+CurvePoint: TypeAlias = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+"""Rollouts learned from so far, mean training loss since the last point, loss on held-out tasks."""
+CalibrationBin: TypeAlias = tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat]
+"""Mean predicted cost of a bin; 10 %, median and 90 % of the measured; how many rollouts."""
 
 
 class ModelCard(BaseModel):
@@ -32,5 +39,11 @@ class ModelCard(BaseModel):
     """The planner's weight of the extra snap that suits this model."""
     validation: dict[str, FiniteFloat]
     """Figures on tasks that were held out, by name."""
+    target: Literal["error", "released"] = "error"
+    """What is predicted, as a logarithm: the largest error, or the released code's label."""
+    learning_curve: tuple[CurvePoint, ...] = ()
+    """Of the first member, in the last round."""
+    calibration: dict[str, tuple[CalibrationBin, ...]] = {}
+    """Measured against predicted cost on held-out tasks: of `optima`, and of plans that were `planned`."""
     versions: dict[str, str]
     """Of the packages that made it."""

@@ -1,8 +1,8 @@
 """Models of the tracking cost as files: one safetensors file each, checked from end to end when it is loaded.
 
-The metadata holds one JSON text: the card, the feature version, the activation, and a SHA-256 over all of that and
-every tensor. The tensors `test.*` are plans with the cost that the model gave them when it was saved: a machine, a
-library or a feature that computes something else is found out at loading, not in the air.
+The metadata holds one JSON text: the card, the feature version, inputs and activation, and a SHA-256 over all of
+that and every tensor. The tensors `test.*` are plans with the cost that the model gave them when it was saved: a
+machine, a library or a feature that computes something else is found out at loading, not in the air.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lcd_flight.model import InputError, Loop, Trajectories
-from lcd_flight.planning.cost.features import FEATURE_NAMES, FEATURE_VERSION
+from lcd_flight.planning.cost.features import FEATURE_VERSION
+from lcd_flight.planning.cost.inputs import INPUTS
 from lcd_flight.planning.cost.network import ACTIVATIONS, Network
 from lcd_flight.planning.cost.tracking_cost import CostModel
 
@@ -64,12 +65,14 @@ def save_model(path: Path, model: CostModel, card: ModelCard, test_plans: Trajec
     tensors: Tensors = {name: getattr(model, name) for name in _RANGES}
     for i, layer in enumerate(model.network.layers):
         tensors |= {f"layer{i}.weights": layer.weights, f"layer{i}.biases": layer.biases}
+        tensors |= {} if layer.skip is None else {f"layer{i}.skip": layer.skip.weights}
     tensors |= {"test.durations_s": test_plans.durations_s, "test.coefficients": test_plans.coefficients}
     tensors = {name: np.ascontiguousarray(t) for name, t in sorted((tensors | {"test.value": value}).items())}
     _check_finite(path, tensors)
     about = {
         "format": _FORMAT,
         "feature_version": FEATURE_VERSION,
+        "inputs": model.inputs.name,
         "activation": model.network.activation,
         "card": card.model_dump(mode="json"),
     }
@@ -151,12 +154,15 @@ def _read(path: Path) -> tuple[Tensors, dict[str, Any]]:
 
 def _model(path: Path, tensors: Tensors, about: Mapping[str, Any]) -> CostModel:
     """Put the tensors together; the checksum has shown that they are what was saved."""
-    if about["activation"] not in ACTIVATIONS or tensors["feature_mean"].shape != (len(FEATURE_NAMES),):
+    inputs = about.get("inputs", "windows")  # files from before there was a choice do not say
+    if about["activation"] not in ACTIVATIONS or inputs not in INPUTS:
         raise InputError(f"{path}: a model of another version of this program; train it anew")
-    layers = range(sum(name.endswith(".weights") for name in tensors))
-    weights, biases = [tensors[f"layer{i}.weights"] for i in layers], [tensors[f"layer{i}.biases"] for i in layers]
+    numbers = range(sum(name.endswith(".weights") for name in tensors))
+    weights, biases = ([tensors[f"layer{i}.{kind}"] for i in numbers] for kind in ("weights", "biases"))
+    skips = [tensors[f"layer{i}.skip"] for i in numbers if f"layer{i}.skip" in tensors]
+    network = Network.of(weights, biases, about["activation"], skips)
     mean, spread, low, high = (tensors[name] for name in _RANGES)
-    return CostModel(Network.of(weights, biases, about["activation"]), mean, spread, low, high)
+    return CostModel(network, mean, spread, low, high, INPUTS[inputs])
 
 
 def _card(path: Path, about: Mapping[str, Any]) -> ModelCard:

@@ -1,5 +1,9 @@
 """An ensemble of small fully connected networks, forward and backward.
 
+A network with `skips` is fed its inputs at every layer, too. Where the weights between its layers are not negative and
+the activation is convex and never falls (elu, relu), it is convex in its inputs (Amos, Xu, Kolter 2017): the paper's
+future work.
+
 The members are stacked, so that one call serves all of them. The arithmetic is that of the weights: float32 for
 planning, float64 where a test wants the last digit. A row's outputs depend on that row alone, to the bit.
 """
@@ -33,12 +37,24 @@ class Layer:
     weights: Array
     transposed: Array
     biases: Array
+    skip: Layer | None = None
+    """From the network's inputs straight to this layer; without biases of its own (zeros)."""
 
     @staticmethod
-    def of(weights: Array, biases: Array) -> Layer:
-        """From weights (M, inputs, outputs) and biases (M, outputs) of one precision."""
+    def of(weights: Array, biases: Array, skip: Array | None = None) -> Layer:
+        """From weights (M, inputs, outputs), biases (M, outputs) and a skip (M, network's inputs, outputs)."""
         transposed = np.ascontiguousarray(weights.transpose(0, 2, 1))
-        return Layer(np.ascontiguousarray(weights), transposed, np.ascontiguousarray(biases))
+        around = None if skip is None else Layer.of(skip, np.zeros_like(biases))
+        return Layer(np.ascontiguousarray(weights), transposed, np.ascontiguousarray(biases), around)
+
+    def forward(self, x: Array, inputs: Array) -> Array:
+        """Before the activation: (M, B, outputs) of the layer before (M or 1, B, .) and the network's inputs."""
+        out = _affine(x, self.weights, self.biases)
+        return out if self.skip is None else out + _affine(inputs, self.skip.weights, self.skip.biases)
+
+    def backward(self, grad: Array) -> Array:
+        """The gradient by the layer before, from that before the activation."""
+        return _affine(grad, self.transposed, np.zeros(self.weights.shape[:2], self.weights.dtype))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,9 +73,15 @@ class Network:
     activation: Activation
 
     @staticmethod
-    def of(weights: Sequence[Array], biases: Sequence[Array], activation: Activation) -> Network:
-        """From weights (M, inputs, outputs) and biases (M, outputs), input layer first; the last has one output."""
-        return Network(tuple(Layer.of(w, b) for w, b in zip(weights, biases, strict=True)), activation)
+    def of(
+        weights: Sequence[Array], biases: Sequence[Array], activation: Activation, skips: Sequence[Array] = ()
+    ) -> Network:
+        """From weights (M, inputs, outputs) and biases (M, outputs), input layer first; the last has one output.
+
+        skips: (M, network's inputs, outputs) of every layer but the first, or none at all.
+        """
+        around = (None, *skips) if skips else (None,) * len(weights)
+        return Network(tuple(Layer.of(w, b, s) for w, b, s in zip(weights, biases, around, strict=True)), activation)
 
     @property
     def members(self) -> int:
@@ -78,25 +100,35 @@ class Network:
 
     def astype(self, dtype: type[np.floating[Any]]) -> Network:
         """The same networks in another precision."""
-        layers = (Layer.of(layer.weights.astype(dtype), layer.biases.astype(dtype)) for layer in self.layers)
-        return Network(tuple(layers), self.activation)
+        weights = [layer.weights.astype(dtype) for layer in self.layers]
+        biases = [layer.biases.astype(dtype) for layer in self.layers]
+        return Network.of(weights, biases, self.activation, [skip.astype(dtype) for skip in self.skips])
+
+    @property
+    def skips(self) -> list[Array]:
+        """(M, inputs, outputs) of every layer but the first; empty for a network without."""
+        return [layer.skip.weights for layer in self.layers if layer.skip is not None]
 
     def forward(self, inputs: Array) -> tuple[Array, Tape]:
         """Outputs (M, B) for inputs (B, inputs), and what `backward` needs."""
-        x = np.ascontiguousarray(inputs, dtype=self.dtype)[None]
-        slopes = []
+        first = np.ascontiguousarray(inputs, dtype=self.dtype)[None]
+        x, slopes = first, []
         for layer in self.layers[:-1]:
-            x, slope = activate(_affine(x, layer.weights, layer.biases), self.activation)
+            x, slope = activate(layer.forward(x, first), self.activation)
             slopes.append(slope)
-        return _affine(x, self.layers[-1].weights, self.layers[-1].biases)[..., 0], Tape(tuple(slopes))
+        return self.layers[-1].forward(x, first)[..., 0], Tape(tuple(slopes))
 
     def backward(self, tape: Tape, grad_outputs: Array) -> Array:
         """From a function's gradient by the outputs (M, B) to its gradient by the inputs (B, inputs)."""
-        grad = np.asarray(grad_outputs, dtype=self.dtype)[..., None] * self.layers[-1].transposed
-        for layer, slope in zip(reversed(self.layers[:-1]), reversed(tape.slopes), strict=True):
-            grad *= slope
-            grad = _affine(grad, layer.transposed, np.zeros(layer.weights.shape[:2], self.dtype))
-        return np.asarray(grad.sum(axis=0))
+        grad = np.asarray(grad_outputs, dtype=self.dtype)[..., None]
+        around: list[Array] = []
+        for layer, slope in zip(reversed(self.layers), (*reversed(tape.slopes), None), strict=True):
+            if layer.skip is not None:
+                around.append(layer.skip.backward(grad))
+            grad = layer.backward(grad) if layer.weights.shape[2] > 1 else grad * layer.transposed
+            if slope is not None:
+                grad *= slope
+        return np.asarray(sum(around, grad).sum(axis=0))
 
 
 def _affine(x: Array, weights: Array, biases: Array) -> Array:

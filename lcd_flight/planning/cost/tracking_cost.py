@@ -3,6 +3,8 @@
     features of each segment -> normalised -> window (previous, this, next segment, 2 flags) -> members of an ensemble
     -> log of each segment's largest error -> logsumexp over segments -> mean + 1 standard deviation over members
 
+Other inputs than windows (`inputs`) see the whole trajectory in one row, which stands where a segment does here.
+
 The logsumexp (sharpness 3) is the smooth maximum that makes a segment's error the plan's; the standard deviation is
 the pessimism that keeps a planner from where the members disagree, which is where there were no data.
 """
@@ -14,8 +16,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lcd_flight.model import BoolArray, FloatArray
-from lcd_flight.planning.cost.features import FEATURE_NAMES, segment_features, segment_features_pullback
+from lcd_flight.model import BoolArray, FloatArray, InputError
+from lcd_flight.planning.cost.inputs import INPUTS, Inputs
 from lcd_flight.planning.cost.network import Array, Network
 
 if TYPE_CHECKING:
@@ -40,30 +42,6 @@ _LEAST_MARGIN = 1e-6
 """So that a feature that never varied has a range, too."""
 
 
-def windows(normalised: Array) -> Array:
-    """Each segment between its neighbours: (N, S, F) -> (N, S, 3 F + 2).
-
-    Previous, this and next segment, zeros where there is none, then 1 in a plan's first segment and 1 in its last.
-    """
-    tasks, segments, width = normalised.shape
-    out = np.zeros((tasks, segments, 3 * width + 2), dtype=normalised.dtype)
-    out[:, 1:, :width] = normalised[:, :-1]
-    out[:, :, width : 2 * width] = normalised
-    out[:, :-1, 2 * width : 3 * width] = normalised[:, 1:]
-    out[:, 0, 3 * width] = 1.0
-    out[:, -1, 3 * width + 1] = 1.0
-    return out
-
-
-def windows_pullback(grad_windows: Array) -> Array:
-    """Reverse mode of `windows`: (N, S, 3 F + 2) -> (N, S, F)."""
-    width = (grad_windows.shape[2] - 2) // 3
-    grad = grad_windows[:, :, width : 2 * width].copy()
-    grad[:, :-1] += grad_windows[:, 1:, :width]
-    grad[:, 1:] += grad_windows[:, :-1, 2 * width : 3 * width]
-    return grad
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class CostModel:
     """A trained tracking cost; what it was trained for stands on its card.
@@ -73,7 +51,7 @@ class CostModel:
     """
 
     network: Network
-    """3 F + 2 inputs, one output y; as many members as were trained."""
+    """One output y for each row of its inputs; as many members as were trained."""
     feature_mean: FloatArray
     """(F,) taken from the features before the networks see them."""
     feature_spread: FloatArray
@@ -82,6 +60,8 @@ class CostModel:
     """(F,) lower end of what the networks were trained on."""
     feature_high: FloatArray
     """(F,) upper end."""
+    inputs: Inputs = INPUTS["windows"]
+    """What the networks see of a plan."""
     card: ModelCard | None = None
     """None for a model that was not saved yet."""
 
@@ -98,18 +78,21 @@ class CostModel:
             The costs (N,), their gradients by the durations (N, S) with the coefficients held, and by the
             coefficients (N, 4, S, 8). Not finite where the plan is not.
         """
-        features = segment_features(durations_s, coefficients)
+        features = self._features(durations_s, coefficients)
         value, grad_features = np.empty(len(features)), np.empty(features.shape)
-        for rows in self._row_blocks(*durations_s.shape):
+        for rows in self._row_blocks(*features.shape[:2]):
             value[rows], grad_features[rows] = self._of_features(features[rows])
-        return value, *segment_features_pullback(durations_s, coefficients, grad_features)
+        return value, *self.inputs.pullback(durations_s, coefficients, grad_features)
 
     def predict_segment_errors_m(self, durations_s: FloatArray, coefficients: FloatArray) -> FloatArray:
-        """(N, S) the largest error in each segment in m, by the mean of the members' logarithms: no pessimism."""
-        features = segment_features(durations_s, coefficients)
-        log_error = np.empty(durations_s.shape)
-        for rows in self._row_blocks(*durations_s.shape):
-            inputs = windows(self._normalised(features[rows]))
+        """(N, S) the largest error in each segment in m, by the mean of the members' logarithms: no pessimism.
+
+        (N, 1) that of the whole trajectory, where that is what the networks see.
+        """
+        features = self._features(durations_s, coefficients)
+        log_error = np.empty(features.shape[:2])
+        for rows in self._row_blocks(*log_error.shape):
+            inputs = self.inputs.arrange(self._normalised(features[rows]))
             outputs, _ = self.network.forward(inputs.reshape(-1, inputs.shape[2]))
             log_error[rows] = outputs.mean(axis=0, dtype=np.float64).reshape(inputs.shape[:2])
         return np.asarray(np.exp(log_error))
@@ -120,20 +103,34 @@ class CostModel:
 
     def in_range(self, durations_s: FloatArray, coefficients: FloatArray) -> BoolArray:
         """(N,) whether all features of a plan are within what the networks were trained on."""
-        return np.asarray((self._beyond(segment_features(durations_s, coefficients)) <= 0.0).all(axis=(1, 2)))
+        return np.asarray((self._beyond(self._features(durations_s, coefficients)) <= 0.0).all(axis=(1, 2)))
 
     def out_of_range(self, durations_s: FloatArray, coefficients: FloatArray) -> tuple[str | None, ...]:
         """For each plan None, or which feature is farthest out."""
-        return tuple(self._farthest(features) for features in segment_features(durations_s, coefficients))
+        names = self.inputs.names(durations_s.shape[1])
+        return tuple(self._farthest(features, names) for features in self._features(durations_s, coefficients))
 
-    def _farthest(self, features: FloatArray) -> str | None:
-        """What of features (S, F) is farthest out, in units of the range; None where all is inside."""
+    def _features(self, durations_s: FloatArray, coefficients: FloatArray) -> FloatArray:
+        """(N, R, F).
+
+        Raises:
+            InputError: the networks see whole trajectories of another number of segments.
+        """
+        features = self.inputs.features(durations_s, coefficients)
+        if features.shape[2] != len(self.feature_mean):
+            name = "this model" if self.card is None else f"model {self.card.name}"
+            raise InputError(f"{name}: sees whole trajectories, of another number of waypoints; use one of windows")
+        return features
+
+    def _farthest(self, features: FloatArray, names: tuple[str, ...]) -> str | None:
+        """What of features (R, F) is farthest out, in units of the range; None where all is inside."""
         low, high, beyond = self.feature_low, self.feature_high, self._beyond(features)
         segment, column = np.unravel_index(beyond.argmax(), beyond.shape)
         if beyond[segment, column] <= 0.0:
             return None
         value, bounds = features[segment, column], f"{low[column]:.3g} to {high[column]:.3g}"
-        return f"{FEATURE_NAMES[column]} of segment {segment + 1} is {value:.3g}, trained on {bounds}"
+        place = f" of segment {segment + 1}" if len(features) > 1 else ""
+        return f"{names[column]}{place} is {value:.3g}, trained on {bounds}"
 
     def _beyond(self, features: FloatArray) -> FloatArray:
         """How far features (..., F) are beyond what is tolerated, in spans of their range; above 0 is outside."""
@@ -148,17 +145,17 @@ class CostModel:
 
     def _of_features(self, features: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The costs (N,) of features (N, S, F), and their gradient by these."""
-        inputs = windows(self._normalised(features))
+        inputs = self.inputs.arrange(self._normalised(features))
         with np.errstate(over="ignore", invalid="ignore"):
             outputs, tape = self.network.forward(inputs.reshape(-1, inputs.shape[2]))
             log_errors = outputs.astype(np.float64).reshape(-1, *inputs.shape[:2])
             value, grad_log_errors = _aggregate(log_errors)
             grad_inputs = self.network.backward(tape, grad_log_errors.reshape(len(log_errors), -1))
-            return value, windows_pullback(grad_inputs.reshape(inputs.shape)) / self.feature_spread
+            return value, self.inputs.arrange_pullback(grad_inputs.reshape(inputs.shape)) / self.feature_spread
 
     @staticmethod
-    def _row_blocks(tasks: int, segments: int) -> list[slice]:
-        step = max(1, _BATCH_WINDOWS // segments)
+    def _row_blocks(tasks: int, rows: int) -> list[slice]:
+        step = max(1, _BATCH_WINDOWS // rows)
         return [slice(first, first + step) for first in range(0, tasks, step)]
 
 

@@ -30,7 +30,7 @@ TINY = TrainConfig(
     rounds=1,
     policy_tasks=40,
     members=2,
-    mix=Mix(search_tasks=50, search_population=8, search_generations=4, random_tasks=590, random_draws=3),
+    mix=Mix(search=0.4, random=0.45, optimum=0.15, population=8, generations=4, shard_rows=4_000),
     fit=FitSettings(hidden=(32, 16), epochs=12, batch=256),
 )
 
@@ -115,7 +115,7 @@ def test_policy_rows_are_the_plan_and_jitter_around_it(trained, sim, tmp_path):
     task = config.tasks(0, 6)
     plans = policy_plans(config, load_model(path), task)
     z, theta = plans.z.reshape(6, 16, -1), plans.theta.reshape(6, 16, -1)
-    assert set(plans.source) == {Source.POLICY}
+    assert set(plans.source) == {Source.GIVEN}
     assert np.array_equal(plans.task, np.repeat(task, 16))
     assert np.abs(z[:, 0]).max() > 0.05
     assert np.all(np.linalg.norm(z[:, 1:] - z[:, :1], axis=2) > 0.0)

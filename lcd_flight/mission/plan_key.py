@@ -58,19 +58,21 @@ def model_hash(model: DataclassInstance) -> str:
 
 
 def _parts(value: Any) -> Iterator[bytes]:
-    """A model's numbers and words, in the order of its fields."""
+    """Numbers and words, in the order of fields; of an object without fields, its kind and what it holds."""
     if isinstance(value, np.ndarray):
         yield f"{value.dtype.str} {value.shape}".encode()
         yield value.tobytes()
-    elif is_dataclass(value):
-        for each in fields(value):
-            yield each.name.encode()
-            yield from _parts(getattr(value, each.name))
-    elif isinstance(value, tuple):
-        for item in value:
+    elif isinstance(value, tuple | list | dict):
+        for item in value.items() if isinstance(value, dict) else value:
             yield from _parts(item)
-    else:
+    elif value is None or isinstance(value, str | int | float):
         yield repr(value).encode()
+    else:
+        yield type(value).__qualname__.encode()
+        names = [each.name for each in fields(value)] if is_dataclass(value) else sorted(getattr(value, "__dict__", ()))
+        for name in names:
+            yield name.encode()
+            yield from _parts(getattr(value, name))
 
 
 @cache

@@ -22,6 +22,8 @@ class Outcome(StrEnum):
     CRASHED = "crashed"
     CUT = "cut"
     """Motors were stopped in the air, or a descent without pose ran its time."""
+    DIFFERENT = "different"
+    """A comparison came out otherwise than it should: `lcd replay`."""
     INTERNAL_ERROR = "internal_error"
     """A fault of ours."""
 
@@ -40,6 +42,7 @@ _EXIT_CODES = {
     Outcome.INTERRUPTED: 130,
     Outcome.CRASHED: 5,
     Outcome.CUT: 5,
+    Outcome.DIFFERENT: 1,
     Outcome.INTERNAL_ERROR: 70,
 }
 

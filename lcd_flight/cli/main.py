@@ -11,7 +11,7 @@ from pathlib import Path
 import typer
 from typer.exceptions import TyperException
 
-from lcd_flight.cli import bench, evaluation, fly, learning, mission, plan, recover, replay, review
+from lcd_flight.cli import bench, evaluation, fly, learning, mission, plan, recover, replay, review, sim
 from lcd_flight.cli.terminal import Terminal
 from lcd_flight.errors import LcdError, Outcome
 
@@ -35,6 +35,7 @@ app.command("review")(review.review)
 app.command("replay")(replay.replay)
 app.command("recover")(recover.recover)
 app.command("bench")(bench.bench)
+app.add_typer(sim.app, name="sim")
 
 flyer = typer.Typer(
     name="lcd-fly", add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None, help=fly.fly.__doc__

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from lcd_flight.flight.memory import Memory
@@ -11,6 +11,14 @@ from lcd_flight.flight.setup import FlightSetup
 from lcd_flight.flight.tick import tick
 from lcd_flight.model import AttitudeThrust, Tick, TickInputs
 from lcd_flight.model.frames import angle_between
+
+Pair = tuple[TickInputs, Tick]
+
+THRUST_TOLERANCE_SHARE = 1e-9
+"""Of the vehicle's greatest thrust: what setpoints may differ by on another machine, whose sine and cosine may round
+the last bit otherwise. The loop has no state that would let such a difference grow without bound but the integral."""
+ANGLE_TOLERANCE_RAD = 1e-7
+"""Likewise. An angle between unit quaternions of doubles cannot be told better than 4e-8."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +41,39 @@ class Difference:
         return math.pi if pair is None else angle_between(pair[0].q_WB, pair[1].q_WB)
 
 
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """A flight beside its replay."""
+
+    pairs: tuple[Difference, ...]
+    """Every tick that was compared, equal or not."""
+    different: tuple[Difference, ...]
+    """Those in which anything differs: a setpoint, a phase, a finding."""
+    missing_after: int | None
+    """The tick after which the log misses some, so that the comparison ended there; None where it has all."""
+
+    @property
+    def equal(self) -> bool:
+        """Whether every tick is the same, to the bit."""
+        return not self.different
+
+    @property
+    def thrust_N(self) -> float:
+        """The largest difference between setpoints."""
+        return max((d.thrust_N for d in self.different), default=0.0)
+
+    @property
+    def angle_rad(self) -> float:
+        """The largest difference between setpoints."""
+        return max((d.angle_rad for d in self.different), default=0.0)
+
+    def agrees(self, greatest_thrust_N: float) -> bool:
+        """Whether it is the same flight but for what another machine may round otherwise."""
+        same_phases = all(d.logged.phase is d.replayed.phase for d in self.different)
+        close = self.thrust_N <= THRUST_TOLERANCE_SHARE * greatest_thrust_N and self.angle_rad <= ANGLE_TOLERANCE_RAD
+        return same_phases and close
+
+
 def replayed(inputs: Iterable[TickInputs], setup: FlightSetup) -> Iterator[Tick]:
     """What the tick decides on these inputs, from the first tick of a flight on.
 
@@ -44,11 +85,27 @@ def replayed(inputs: Iterable[TickInputs], setup: FlightSetup) -> Iterator[Tick]
         yield decided
 
 
-def differences(flight: Iterable[tuple[TickInputs, Tick]], setup: FlightSetup) -> list[Difference]:
+def compare(flight: Sequence[Pair], setup: FlightSetup) -> Comparison:
+    """The flight beside its replay, from its first tick to the first that the log misses.
+
+    What a tick remembers comes from all ticks before it: after a gap there is nothing to compare with.
+    """
+    unbroken = _unbroken(flight)
+    again = replayed((inputs for inputs, _ in unbroken), setup)
+    pairs = tuple(Difference(logged, now) for (_, logged), now in zip(unbroken, again, strict=True))
+    different = tuple(pair for pair in pairs if pair.logged != pair.replayed)
+    return Comparison(pairs, different, None if len(unbroken) == len(flight) else len(unbroken) - 1)
+
+
+def _unbroken(flight: Sequence[Pair]) -> Sequence[Pair]:
+    """The ticks before the first that is missing."""
+    gap = next((number for number, (inputs, _) in enumerate(flight) if inputs.sequence != number), len(flight))
+    return flight[:gap]
+
+
+def differences(flight: Iterable[Pair], setup: FlightSetup) -> list[Difference]:
     """Every logged tick that comes out otherwise; none on the machine and version that flew it."""
-    pairs = list(flight)
-    again = replayed((inputs for inputs, _ in pairs), setup)
-    return [Difference(logged, now) for (_, logged), now in zip(pairs, again, strict=True) if logged != now]
+    return list(compare(list(flight), setup).different)
 
 
 def _pair(a: AttitudeThrust | None, b: AttitudeThrust | None) -> tuple[AttitudeThrust, AttitudeThrust] | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -12,14 +11,11 @@ from lcd_flight.control import flight_law
 from lcd_flight.flight.manoeuvres import pressed_down
 from lcd_flight.model import (
     GRAVITY_M_PER_S2,
-    AttitudeThrust,
+    ControlLaw,
     FlightPlan,
     LegKind,
-    Reference,
     SafetyLimits,
-    State,
     Trajectory,
-    Vector3,
     Vehicle,
 )
 from lcd_flight.safety.gate import GateLimits
@@ -27,16 +23,6 @@ from lcd_flight.safety.monitors import Monitor, monitors
 
 SPARE_SHARE = 0.85
 """Of the thrust limit: a plan that stays below leaves what control needs."""
-
-
-class ControlLaw(Protocol):
-    """From state and reference to a setpoint; the integral goes in and comes out."""
-
-    def __call__(
-        self, state: State, reference: Reference, vehicle: Vehicle, integral: Vector3, dt_s: float
-    ) -> tuple[AttitudeThrust, Vector3]:
-        """One control step."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)

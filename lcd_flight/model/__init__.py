@@ -7,6 +7,7 @@ from lcd_flight.model.phase import Phase
 from lcd_flight.model.plan import FlightPlan, Leg, LegKind
 from lcd_flight.model.ports import (
     Clock,
+    ControlLaw,
     Link,
     LinkContext,
     Observer,
@@ -45,6 +46,7 @@ __all__ = [
     "BoolArray",
     "Clock",
     "Command",
+    "ControlLaw",
     "Finding",
     "FlightPlan",
     "FloatArray",

@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Protocol, Self
 
 from lcd_flight.model.rollout import RolloutLabels
-from lcd_flight.model.state import AttitudeThrust
+from lcd_flight.model.state import AttitudeThrust, Reference, State
 from lcd_flight.model.telemetry import LinkReport, PoseReport, RawPose
 from lcd_flight.model.tick import Tick, TickInputs
 from lcd_flight.model.trajectory import Trajectories
@@ -155,6 +155,16 @@ class PosePublisher(Protocol):
 
     def close(self) -> None:
         """Give the endpoint back."""
+        ...
+
+
+class ControlLaw(Protocol):
+    """From state and reference to a setpoint; the integral (m/s^2, world) goes in and comes out. Pure."""
+
+    def __call__(
+        self, state: State, reference: Reference, vehicle: Vehicle, integral: Vector3, dt_s: float
+    ) -> tuple[AttitudeThrust, Vector3]:
+        """One control step; a result that is not finite, or an arithmetic error, counts as none."""
         ...
 
 

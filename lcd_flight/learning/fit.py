@@ -1,7 +1,6 @@
-"""Train the members of a segment-window network in torch, which lives in this file alone.
+"""Train the members of an ensemble in torch.
 
-What comes out are plain arrays for `lcd_flight.planning.cost.network`, its twin without torch; a test holds one to
-the other.
+What comes out are plain arrays for `lcd_flight.planning.cost.network`, its twin without torch.
 """
 
 from __future__ import annotations
@@ -10,21 +9,24 @@ import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import pairwise
 from threading import Lock
-from typing import Any, Literal, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
 from lcd_flight.learning.extras import require_torch
+from lcd_flight.learning.torch_network import Module, Tensor, network_of, project, torch_network
 from lcd_flight.learning.training_set import TrainingSet
 from lcd_flight.model import IntArray
+from lcd_flight.planning.cost.model_card import CurvePoint
 from lcd_flight.planning.cost.network import Activation, Network
-from lcd_flight.planning.cost.tracking_cost import SHARPNESS
 
-Tensor: TypeAlias = Any
 Report: TypeAlias = Callable[[int], None]
 """Told how many rollouts were just learned from."""
+
+CURVE_POINTS = 40
+_HELD_OUT_ROWS = 8192
+"""That a point of the learning curve is taken on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +35,8 @@ class FitSettings:
 
     hidden: tuple[int, ...] = (128, 128, 32)
     activation: Activation = "silu"
+    convex: bool = False
+    """Whether the network is convex in its inputs; wants an activation that is (elu, relu)."""
     epochs: int = 3
     batch: int = 4096
     """Rollouts in a step."""
@@ -41,11 +45,18 @@ class FitSettings:
     weight_decay: float = 1e-2
     gradient_clip: float = 5.0
     huber_delta: float = 0.5
-    loss: Literal["segment", "rollout"] = "segment"
-    """What is compared: the error of each segment, or that of the rollout by the smooth maximum over segments."""
 
 
-def fit(data: TrainingSet, settings: FitSettings, members: int, seed: int, report: Report) -> Network:
+@dataclass(frozen=True, slots=True, eq=False)
+class Fitted:
+    """What training gives."""
+
+    network: Network
+    curve: tuple[CurvePoint, ...]
+    """Of the first member."""
+
+
+def fit(data: TrainingSet, settings: FitSettings, members: int, seed: int, report: Report) -> Fitted:
     """Train `members` networks on the training tasks of `data`, each with a start and an order of its own.
 
     Side by side, one core each: small networks gain little from sharing one.
@@ -55,20 +66,16 @@ def fit(data: TrainingSet, settings: FitSettings, members: int, seed: int, repor
     """
     torch = require_torch()
     torch.set_num_threads(max(1, (os.cpu_count() or 1) // members))
-    models = [_network(data, settings, seed * 1000 + member) for member in range(members)]
+    modules = [_module(data, settings, seed * 1000 + member) for member in range(members)]
     crew = _Crew(report)
     with ThreadPoolExecutor(members) as pool:
-        work = [pool.submit(_train, m, data, settings, seed * 1000 + i, crew) for i, m in enumerate(models)]
+        work = [pool.submit(_train, m, data, settings, seed * 1000 + i, crew) for i, m in enumerate(modules)]
         try:
-            for member in work:
-                member.result()
+            curves = [member.result() for member in work]
         except BaseException:
             crew.stop = True
             raise
-    layers = [[layer for layer in model if hasattr(layer, "weight")] for model in models]
-    weights = [np.stack([one.weight.detach().numpy().T for one in same]) for same in zip(*layers, strict=True)]
-    biases = [np.stack([one.bias.detach().numpy() for one in same]) for same in zip(*layers, strict=True)]
-    return Network.of(weights, biases, settings.activation)
+    return Fitted(network_of(modules, settings.activation), tuple(curves[0]))
 
 
 class _Crew:
@@ -85,38 +92,48 @@ class _Crew:
             self._report(rollouts)
 
 
-def _train(model: Any, data: TrainingSet, settings: FitSettings, seed: int, crew: _Crew) -> None:
-    """Train one member."""
+def _train(module: Module, data: TrainingSet, settings: FitSettings, seed: int, crew: _Crew) -> list[CurvePoint]:
+    """Train one member; returns its learning curve."""
     torch = require_torch()
     rows = data.rows(training=True)
-    optimiser = torch.optim.AdamW(model.parameters(), settings.learning_rate, weight_decay=settings.weight_decay)
+    optimiser = torch.optim.AdamW(module.parameters(), settings.learning_rate, weight_decay=settings.weight_decay)
     steps = settings.epochs * -(-len(rows) // settings.batch)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, settings.learning_rate, total_steps=steps)
-    for chosen in _batches(rows, settings, np.random.default_rng(seed)):
+    curve, losses, learned = [], [], 0
+    for step, chosen in enumerate(_batches(rows, settings, np.random.default_rng(seed)), start=1):
         optimiser.zero_grad(set_to_none=True)
-        _loss(model, data, chosen, settings).backward()
-        torch.nn.utils.clip_grad_norm_(model.parameters(), settings.gradient_clip)
+        loss = _loss(module, data, chosen, settings)
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(module.parameters(), settings.gradient_clip)
         optimiser.step()
         schedule.step()
+        project(module)
+        losses.append(float(loss.detach()))
+        learned += len(chosen)
+        if step % max(1, steps // CURVE_POINTS) == 0 or step == steps:
+            curve.append((float(learned), float(np.mean(losses)), _held_out_loss(module, data, settings)))
+            losses = []
         crew.learned(len(chosen))
         if crew.stop:
-            return
+            break
+    return curve
 
 
-def _network(data: TrainingSet, settings: FitSettings, seed: int) -> Any:
-    """Linear layers with the activation between them; one output, which begins near the mean of the targets."""
-    torch = require_torch()
-    torch.manual_seed(seed)
-    activation = {"silu": torch.nn.SiLU, "elu": torch.nn.ELU, "relu": torch.nn.ReLU}[settings.activation]
-    widths = [3 * data.features.shape[2] + 2, *settings.hidden, 1]
-    layers: list[Any] = []
-    for before, after in pairwise(widths):
-        layers += [torch.nn.Linear(before, after), activation()]
-    model = torch.nn.Sequential(*layers[:-1])
+def _held_out_loss(module: Module, data: TrainingSet, settings: FitSettings) -> float:
+    """On some rollouts of tasks that are not trained on."""
+    rows = data.rows(training=False)
+    rows = rows[:: max(1, len(rows) // _HELD_OUT_ROWS)]
+    with require_torch().no_grad():
+        return float(_loss(module, data, rows, settings))
+
+
+def _module(data: TrainingSet, settings: FitSettings, seed: int) -> Module:
+    """One member, untrained; its output begins near the mean of the targets."""
     rows = data.rows(training=True)
-    with torch.no_grad():
-        model[-1].bias.fill_(float(data.segment[rows][data.kept[rows]].mean()))
-    return model
+    inputs = data.inputs.arrange(data.features[:1]).shape[2]
+    mean = float(data.wanted[rows][data.kept[rows]].mean())
+    widths = (inputs, *settings.hidden)
+    return torch_network(widths, settings.activation, convex=settings.convex, seed=seed, mean=mean)
 
 
 def _batches(rows: IntArray, settings: FitSettings, generator: np.random.Generator) -> Iterator[IntArray]:
@@ -127,21 +144,21 @@ def _batches(rows: IntArray, settings: FitSettings, generator: np.random.Generat
             yield np.sort(order[first : first + settings.batch])
 
 
-def _loss(model: Any, data: TrainingSet, rows: IntArray, settings: FitSettings) -> Tensor:
-    """Huber loss of the chosen rollouts."""
+def _loss(module: Module, data: TrainingSet, rows: IntArray, settings: FitSettings) -> Tensor:
+    """Huber loss over the rows of the chosen rollouts."""
     torch = require_torch()
-    predicted = model(windows_of(torch.from_numpy(data.features[rows]).float()))[..., 0]
-    if settings.loss == "segment":
-        kept = torch.from_numpy(data.kept[rows])
-        predicted, wanted = predicted[kept], torch.from_numpy(data.segment[rows])[kept]
-    else:
-        predicted = torch.logsumexp(SHARPNESS * predicted, dim=1) / SHARPNESS
-        wanted = torch.from_numpy(data.rollout[rows])
-    return torch.nn.functional.huber_loss(predicted, wanted, delta=settings.huber_delta)
+    inputs = _arranged(torch.from_numpy(data.features[rows]).float(), windows=data.inputs.name == "windows")
+    kept = torch.from_numpy(data.kept[rows])
+    wanted = torch.from_numpy(data.wanted[rows])[kept]
+    return torch.nn.functional.huber_loss(module(inputs)[kept], wanted, delta=settings.huber_delta)
+
+
+def _arranged(features: Tensor, *, windows: bool) -> Tensor:
+    return windows_of(features) if windows else features
 
 
 def windows_of(features: Tensor) -> Tensor:
-    """(B, S, F) to (B, S, 3 F + 2), as `planning.cost.tracking_cost.windows`."""
+    """(B, S, F) to (B, S, 3 F + 2), as `planning.cost.inputs.Windows.arrange`."""
     torch = require_torch()
     rollouts, segments, width = features.shape
     out = torch.zeros((rollouts, segments, 3 * width + 2))

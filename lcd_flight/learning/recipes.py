@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from lcd_flight.learning.collect import CollectConfig, Mix
+from lcd_flight.learning.collect_config import CollectConfig
 from lcd_flight.learning.fit import FitSettings
+from lcd_flight.learning.mix import Mix
 from lcd_flight.learning.policy import DRAWS
+from lcd_flight.learning.targets import TargetName
 from lcd_flight.model import InputError, World
+from lcd_flight.planning.cost.inputs import InputsName
 from lcd_flight.worlds import fingerprint as vehicle_fingerprint
 
 
@@ -28,6 +31,10 @@ class TrainConfig:
     members: int = 1
     snap_weight: float = 0.1
     drags: tuple[int, ...] = (1, 2, 3, 4, 5)
+    inputs: InputsName = "windows"
+    """What the networks see; all but windows tie a model to the worlds' number of waypoints."""
+    target: TargetName = "error"
+    """What they predict; `released` is for networks that see whole trajectories."""
     mix: Mix = field(default_factory=Mix)
     fit: FitSettings = field(default_factory=FitSettings)
 
@@ -35,8 +42,13 @@ class TrainConfig:
         """Check that one network can serve the worlds.
 
         Raises:
-            InputError: no world, or worlds of several vehicles, loops or numbers of waypoints.
+            InputError: no world, worlds of several vehicles, loops or numbers of waypoints, a target or an activation
+                that does not go with the rest.
         """
+        if self.target == "released" and self.inputs == "windows":
+            raise InputError("target released is of whole trajectories: choose the inputs coefficients or knots")
+        if self.fit.convex and self.fit.activation == "silu":
+            raise InputError("a convex network wants an activation that is convex: elu or relu")
         if not self.worlds:
             raise InputError("training needs at least one world")
         kinds = {(vehicle_fingerprint(w.base_vehicle, w.loop), w.loop, w.sampler.waypoints) for w in self.worlds}

@@ -14,19 +14,21 @@ from pathlib import Path
 
 import numpy as np
 
-from lcd_flight.learning.collect import collect, shard_rows
+from lcd_flight.learning.collect import collect
 from lcd_flight.learning.dataset import Dataset
 from lcd_flight.learning.extras import require_pyarrow, require_torch
 from lcd_flight.learning.fingerprint import described, fingerprint, versions
-from lcd_flight.learning.fit import fit
+from lcd_flight.learning.fit import Fitted, fit
+from lcd_flight.learning.mix import shard_rows
 from lcd_flight.learning.policy import DRAWS, PolicyConfig, collect_policy, sha256_of
 from lcd_flight.learning.progress import Meter, ProgressCallback, ignore
-from lcd_flight.learning.rebuild import features, trajectories
+from lcd_flight.learning.rebuild import trajectories
 from lcd_flight.learning.recipes import TrainConfig
 from lcd_flight.learning.rollouts import Rollouts
-from lcd_flight.learning.training_set import Normalisation, TrainingSet
-from lcd_flight.learning.validate import validate
+from lcd_flight.learning.training_set import Normalisation, TrainingSet, features
+from lcd_flight.learning.validate import calibration, validate
 from lcd_flight.model import InputError, Simulator, Trajectories, World
+from lcd_flight.planning.cost.inputs import INPUTS
 from lcd_flight.planning.cost.model_card import ModelCard
 from lcd_flight.planning.cost.model_file import load_model, save_model
 from lcd_flight.planning.cost.tracking_cost import CostModel, training_range
@@ -101,13 +103,12 @@ class _Training:
         members, seed = self._config.members, 1000 * self._config.seed + number
         learned = self._config.fit.epochs * members * len(data.rows(training=True))
         meter = Meter(self._progress, learned, "rollouts learned", 0)
-        network = fit(data, self._config.fit, members, seed, lambda n: meter.advance(n, f"round {number}"))
-        figures = validate(data, network, self._config.fit.huber_delta)
+        fitted = fit(data, self._config.fit, members, seed, lambda n: meter.advance(n, f"round {number}"))
         scale, sample = data.normalisation, data.features[:: max(1, len(data) // _RANGE_ROLLOUTS)]
         low, high = training_range(sample * scale.spread + scale.mean)
-        model = CostModel(network, scale.mean, scale.spread, low, high)
+        model = CostModel(fitted.network, scale.mean, scale.spread, low, high, data.inputs)
         assert self._test_plans is not None  # noqa: S101 - taken when the data were loaded
-        return save_model(path, model, self._card(stamp, len(data), figures), self._test_plans)
+        return save_model(path, model, self._card(stamp, data, fitted), self._test_plans)
 
     def _stamp(self, number: int) -> str:
         """Hash of all that the model of a round is a function of."""
@@ -129,12 +130,14 @@ class _Training:
         """The training set; its scales come from the first shard."""
         if self._data is None:
             plans = trajectories(world, self._config.seed, rollouts.plans)
-            scale = Normalisation.of(features(plans))
-            self._data = TrainingSet(self._config.capacity, plans.segments, scale)
+            inputs = INPUTS[self._config.inputs]
+            first = features(plans, inputs)
+            scale = Normalisation.of(first)
+            self._data = TrainingSet(self._config.capacity, first, inputs, self._config.target, scale)
             self._test_plans = plans.take(np.linspace(0, len(plans) - 1, _TEST_PLANS).astype(np.int64))
         return self._data
 
-    def _card(self, stamp: str, rollouts: int, figures: dict[str, float]) -> ModelCard:
+    def _card(self, stamp: str, data: TrainingSet, fitted: Fitted) -> ModelCard:
         config, first = self._config, self._config.worlds[0]
         return ModelCard(
             name=config.name,
@@ -144,10 +147,13 @@ class _Training:
             worlds=tuple(f"{w.name} v{w.version}" for w in config.worlds),
             parasitic_drag=tuple(first.drag_configurations[d - 1] for d in config.drags),
             speeds=tuple(w.speed for w in config.worlds),
-            rollouts=rollouts,
+            rollouts=len(data),
             data_hash=stamp,
             snap_weight=config.snap_weight,
-            validation=figures,
+            target=config.target,
+            validation=validate(data, fitted.network, config.fit.huber_delta),
+            learning_curve=fitted.curve,
+            calibration=calibration(data, fitted.network),
             versions=versions("numpy", "torch"),
         )
 

@@ -55,17 +55,29 @@ def test_it_beats_the_mean_on_tasks_that_it_never_saw(trained):
 
 
 def test_what_was_measured_rises_with_what_was_predicted(trained):
-    figures = load_model(trained[0] / "tiny.safetensors").card.validation
-    medians = [figures[f"median_m_at_{edge}_m"] for edge in ("0.3", "0.5", "1") if f"median_m_at_{edge}_m" in figures]
-    assert len(medians) >= 2
-    assert medians == sorted(medians)
+    calibration = load_model(trained[0] / "tiny.safetensors").card.calibration
+    for source in ("optima", "planned"):
+        predicted, low, median, high, count = np.array(calibration[source]).T
+        assert (np.diff(predicted) >= 0.0).all()
+        assert (low <= median).all()
+        assert (median <= high).all()
+        assert count.min() >= 10
+    predicted, _, median, _, _ = np.array(calibration["optima"]).T
+    assert np.corrcoef(predicted, median)[0, 1] > 0.7
+
+
+def test_the_learning_curve_falls(trained):
+    learned, training, held_out = np.array(load_model(trained[0] / "tiny.safetensors").card.learning_curve).T
+    assert (np.diff(learned) > 0.0).all()
+    assert training[-5:].mean() < 0.7 * training[:2].mean()
+    assert held_out[-1] < 0.8 * held_out[0]
 
 
 def test_the_card_says_what_it_is_good_for(trained):
     model = load_model(trained[0] / "tiny.safetensors")
     card = model.card
     assert card.name == "tiny"
-    assert card.worlds == ("crazyflie-saturated v1",)
+    assert card.worlds == ("crazyflie-saturated v2",)
     assert card.rollouts == 12_000 + 40 * 16
     assert card.parasitic_drag == WORLD.drag_configurations
     assert {"torch", "lcd-flight"} <= set(card.versions)
@@ -76,7 +88,7 @@ def test_the_card_says_what_it_is_good_for(trained):
 
 
 def test_progress_names_every_stage(trained):
-    assert {p.unit for p in trained[1]} == {"rollouts", "rollouts loaded", "rollouts learned", "tasks"}
+    assert {p.unit for p in trained[1]} == {"rollouts", "rollouts loaded", "rollouts learned"}
     assert all(p.done <= p.total for p in trained[1])
 
 

@@ -80,7 +80,7 @@ class CostModel:
         """
         features = self._features(durations_s, coefficients)
         value, grad_features = np.empty(len(features)), np.empty(features.shape)
-        for rows in self._row_blocks(*features.shape[:2]):
+        for rows in self._row_blocks(len(features), features.shape[1]):
             value[rows], grad_features[rows] = self._of_features(features[rows])
         return value, *self.inputs.pullback(durations_s, coefficients, grad_features)
 
@@ -91,7 +91,7 @@ class CostModel:
         """
         features = self._features(durations_s, coefficients)
         log_error = np.empty(features.shape[:2])
-        for rows in self._row_blocks(*log_error.shape):
+        for rows in self._row_blocks(len(features), features.shape[1]):
             inputs = self.inputs.arrange(self._normalised(features[rows]))
             outputs, _ = self.network.forward(inputs.reshape(-1, inputs.shape[2]))
             log_error[rows] = outputs.mean(axis=0, dtype=np.float64).reshape(inputs.shape[:2])

@@ -1,4 +1,4 @@
-"""`lcd collect` and `lcd train`: data and models of the tracking cost."""
+"""`lcd train`: models of the tracking cost."""
 
 from __future__ import annotations
 
@@ -12,36 +12,6 @@ from lcd_flight.cli.terminal import Terminal, following
 from lcd_flight.errors import InputError, Outcome
 
 Seed = Annotated[int, typer.Option(help="Of tasks, perturbations and noise.", min=0)]
-
-
-def collect(
-    world: Annotated[str, typer.Option(help="A world's name, e.g. crazyflie-saturated.")],
-    out: Annotated[Path, typer.Option(help="Folder of the data set; what is there already is kept.")],
-    count: Annotated[int, typer.Option(help="How many rollouts.", min=1)] = 1_000_000,
-    seed: Seed = 0,
-    json: Json = False,
-    quiet: Quiet = False,
-    no_color: NoColor = False,
-) -> int:
-    """Fly minimum snap, perturbed and searched trajectories and keep what became of them.
-
-    Run again after an interruption, it goes on where it stopped.
-    """
-    from lcd_flight import plugins
-    from lcd_flight.learning.collect import CollectConfig
-    from lcd_flight.learning.collect import collect as collect_rollouts
-    from lcd_flight.worlds import load_world
-
-    terminal = Terminal(json_line=json, quiet=quiet, color=not no_color)
-    terminal.announce_compilation()
-    config = CollectConfig(load_world(world), seed)
-    with following(terminal, "COLLECT") as progress:
-        dataset = collect_rollouts(config, count, out, plugins.simulator(), progress)
-    shards = dataset.numbers()
-    terminal.line("COLLECT", f"{count:,} rollouts in {len(shards)} shards at {out}, configuration {dataset.hash}")
-    return terminal.finish(
-        Outcome.OK, {"rollouts": count, "shards": len(shards), "out": str(out), "data_hash": dataset.hash}
-    )
 
 
 def train(

@@ -11,7 +11,7 @@ from pathlib import Path
 import typer
 from typer.exceptions import TyperException
 
-from lcd_flight.cli import bench, evaluation, fly, learning, mission, plan, recover, replay, review, sim
+from lcd_flight.cli import bench, collect, evaluation, fly, learning, mission, plan, recover, replay, review, sim
 from lcd_flight.cli.terminal import Terminal
 from lcd_flight.errors import LcdError, Outcome
 
@@ -28,7 +28,7 @@ app = typer.Typer(
 app.command("fly")(fly.fly)
 app.command("check")(mission.check)
 app.command("plan")(plan.plan)
-app.command("collect")(learning.collect)
+app.command("collect")(collect.collect)
 app.command("train")(learning.train)
 app.command("evaluate")(evaluation.evaluate)
 app.command("review")(review.review)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from lcd_flight.learning.collect_config import CollectConfig
 from lcd_flight.learning.dataset import Dataset
 from lcd_flight.learning.dataset_card import write_card
-from lcd_flight.learning.fingerprint import described
+from lcd_flight.learning.fingerprint import Description, described, differences, origin
 from lcd_flight.learning.folder_lock import alone_in
 from lcd_flight.learning.given import GivenPlans
 from lcd_flight.learning.manifest import Manifest
@@ -17,7 +18,7 @@ from lcd_flight.learning.progress import Meter, ProgressCallback, ignore
 from lcd_flight.learning.rollouts import Rollouts
 from lcd_flight.learning.shard import ShardJob, ShardMaker
 from lcd_flight.learning.spread import Spread, in_threads
-from lcd_flight.model import Simulator
+from lcd_flight.model import InputError, Simulator
 
 __all__ = ["CollectConfig", "Mix", "collect", "fill", "shard_rows"]
 
@@ -67,10 +68,35 @@ def fill(
         manifest = Manifest(dataset)
         meter.begin(sum(min(manifest.rows(job.number), job.rows) for job in jobs))
         missing = [job for job in jobs if manifest.rows(job.number) < job.rows]
-        for job, rollouts in spread(make, missing):
+        for job, made in spread(_Signed(make), missing):
             fresh = job.rows - manifest.rows(job.number)
-            dataset.write(job.number, rollouts)
+            dataset.write(job.number, made.rollouts, made.checked())
             manifest.add(job.number)
             meter.advance(fresh, note or f"shard {job.number + 1} of {len(jobs)}")
         manifest.write()
         write_card(dataset, manifest)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Made:
+    """A shard, and what flew it."""
+
+    rollouts: Rollouts
+    flown_by: Description
+
+    def checked(self) -> Description:
+        """What flew it, where that is of this process's versions: only then is it the same to the bit."""
+        if self.flown_by["versions"] != origin()["versions"]:
+            what = "; ".join(differences(origin()["versions"], self.flown_by["versions"]))
+            raise InputError(f"a machine of the cluster has other versions ({what}); install the same on each")
+        return self.flown_by
+
+
+@dataclass(frozen=True, slots=True)
+class _Signed:
+    """Makes shards, wherever that may be, and says what flew them."""
+
+    make: Callable[[ShardJob], Rollouts]
+
+    def __call__(self, job: ShardJob) -> _Made:
+        return _Made(self.make(job), origin())

@@ -9,12 +9,12 @@ from typing import Any
 from lcd_flight.model import InputError
 
 
-def _required(module: str) -> ModuleType:
+def _required(module: str, extra: str = "train") -> ModuleType:
     try:
         return importlib.import_module(module)
     except ImportError as error:
         package = module.partition(".")[0]
-        remedy = "install it with `pip install 'lcd-flight[train]'`"
+        remedy = f"install it with `pip install 'lcd-flight[{extra}]'`"
         raise InputError(f"this needs {package}, which is not installed ({error}); {remedy}") from error
 
 
@@ -34,3 +34,12 @@ def require_torch() -> Any:
         InputError: it is not installed.
     """
     return _required("torch")
+
+
+def require_ray() -> Any:
+    """`ray`, of the extra `ray`.
+
+    Raises:
+        InputError: it is not installed.
+    """
+    return _required("ray", extra="ray")

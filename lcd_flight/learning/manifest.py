@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from lcd_flight.learning.dataset import Dataset
 from lcd_flight.learning.files import write_durably
 from lcd_flight.learning.fingerprint import Description
 from lcd_flight.learning.schema import SCHEMA_VERSION
+from lcd_flight.learning.shard_file import ShardHeader
 from lcd_flight.model import InputError
 
 NAME = "manifest.json"
@@ -95,12 +97,8 @@ class Manifest:
         }
 
     def totals(self) -> dict[str, Any]:
-        """Rows, rows of each source, crashes, and runs that left the model's validity."""
-        sources: Counter[str] = Counter()
-        for entry in self.entries:
-            sources.update(entry.sources)
-        sums = {key: sum(getattr(e, key) for e in self.entries) for key in ("rows", "crashed", "invalid")}
-        return {**sums, "sources": dict(sorted(sources.items()))}
+        """See `totals`."""
+        return totals(self.entries)
 
     def _look_at(self, number: int) -> Entry:
         header, path = self._dataset.header(number), self._dataset.path(number)
@@ -116,6 +114,15 @@ class Manifest:
             sha256=hashlib.sha256(content).hexdigest(),
         )
         return self._entries[number]
+
+
+def totals(shards: Sequence[Entry | ShardHeader]) -> dict[str, Any]:
+    """Rows, rows of each source, crashes, and runs that left the model's validity."""
+    sources: Counter[str] = Counter()
+    for shard in shards:
+        sources.update(shard.sources)
+    sums = {key: sum(getattr(shard, key) for shard in shards) for key in ("rows", "crashed", "invalid")}
+    return {**sums, "sources": dict(sorted(sources.items()))}
 
 
 def _known_checksums(path: Path) -> dict[tuple[str, int], str]:

@@ -1,0 +1,1 @@
+"""Crazyflie over radio, USB and UDP, on cflib; imports `lcd_flight.model` and `lcd_flight.wire`."""

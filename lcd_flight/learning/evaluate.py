@@ -59,7 +59,7 @@ def evaluate(
     """
     options = options or EvaluationOptions()
     tasks = tasks_of(world, tasks, options)
-    problems = {drag: _problem(world, tasks, simulator, options, drag) for drag in options.drags}
+    problems = {drag: problem_of(world, tasks, simulator, options, drag) for drag in options.drags}
     _try_out(methods, next(iter(problems.values())))
     cells = [(name, drag) for name in methods for drag in problems]
     runs = {cell: run for cell in cells if parts and (run := parts.load(*cell))}
@@ -80,7 +80,12 @@ def tasks_of(world: World, tasks: Tasks | int, options: EvaluationOptions) -> Ta
     return replace(tasks, yaws_rad=shortest_yaw(tasks.yaws_rad)) if options.yaw == "short" else tasks
 
 
-def _problem(world: World, tasks: Tasks, simulator: Simulator, options: EvaluationOptions, drag: int) -> Problem:
+def problem_of(world: World, tasks: Tasks, simulator: Simulator, options: EvaluationOptions, drag: int) -> Problem:
+    """What a method is told about given tasks in one drag configuration.
+
+    Raises:
+        InputError: there is no such configuration.
+    """
     return Problem(
         world=world,
         vehicle=_vehicle(world, drag),
@@ -112,15 +117,9 @@ def _run(name: str, problem: Problem, options: EvaluationOptions, noise: SeedArr
     planned = _planned(name, problem, meter)
     seconds = time.process_time() - began_s
     tasks, repeats = noise.shape
-    rollouts = RolloutOptions(
-        loop=problem.world.loop,
-        controller=planned.controller,
-        nominal=problem.vehicle,
-        start_aligned=problem.world.start_aligned,
-    )
     plans = planned.plans.take(np.repeat(np.arange(tasks), repeats))
-    flown = problem.vehicle if options.thrust_share == 1.0 else problem.vehicle.weaker(options.thrust_share)
-    labels = problem.simulator.rollout(plans, flown, noise.reshape(-1), rollouts)
+    vehicle = flown_vehicle(problem, options)
+    labels = problem.simulator.rollout(plans, vehicle, noise.reshape(-1), rollouts_of(problem, planned))
     shape = (tasks, 1, repeats)
     return MethodRun(
         max_error_m=labels.max_error_m.reshape(shape),
@@ -130,6 +129,21 @@ def _run(name: str, problem: Problem, options: EvaluationOptions, noise: SeedArr
         relative_snap=_relative_snap(problem, planned)[:, None],
         fell_back=planned.fell_back[:, None],
         plan_seconds=seconds,
+    )
+
+
+def flown_vehicle(problem: Problem, options: EvaluationOptions) -> Vehicle:
+    """The vehicle that flies; planner and controller believe in the problem's."""
+    return problem.vehicle if options.thrust_share == 1.0 else problem.vehicle.weaker(options.thrust_share)
+
+
+def rollouts_of(problem: Problem, planned: Planned) -> RolloutOptions:
+    """How plans are flown, by the controller that they were made for."""
+    return RolloutOptions(
+        loop=problem.world.loop,
+        controller=planned.controller,
+        nominal=problem.vehicle,
+        start_aligned=problem.world.start_aligned,
     )
 
 

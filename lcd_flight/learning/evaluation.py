@@ -6,7 +6,7 @@ Rows are tasks throughout: the flights of one task, with whatever drag and noise
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -168,6 +168,13 @@ class Evaluation:
                 raise InputError(f"method {name} was not evaluated, so it cannot be compared; add it to the methods")
         flights = [self.runs[name].crashed for name in (a, b)]
         return paired_difference(*(crashed.reshape(len(crashed), -1) for crashed in flights))
+
+    @staticmethod
+    def beside(parts: Sequence[Evaluation]) -> Evaluation:
+        """Evaluations of the same tasks and methods in one drag configuration each, by models of their own, as one."""
+        first, drags = parts[0], tuple(drag for p in parts for drag in p.options.drags)
+        runs = {name: MethodRun.beside([p.runs[name] for p in parts]) for name in first.runs}
+        return replace(first, options=replace(first.options, drags=drags, model=None), runs=runs)
 
     def as_json(self) -> dict[str, Any]:
         """What `lcd evaluate --json` prints."""

@@ -13,8 +13,6 @@ from lcd_flight.errors import Outcome
 if TYPE_CHECKING:
     from lcd_flight.cli.sim_server import Bench
 
-Fault = typer.Option(rich_help_panel="Faults; times count from the first thrust")
-
 
 def crazyflie(
     mission: Annotated[
@@ -36,7 +34,7 @@ def crazyflie(
     freeze: Annotated[float | None, typer.Option(help="s after the first thrust: silence both ways.", min=0.0)] = None,
     freeze_ms: Annotated[float, typer.Option(help="How long the silence lasts.", min=0.0)] = 3000.0,
     die: Annotated[float | None, typer.Option(help="s after the first thrust: all power is lost.", min=0.0)] = None,
-    upright: Annotated[float | None, typer.Option(help="s after a fall: put it on its feet.", min=0.0)] = None,
+    upright: Annotated[float | None, typer.Option(help="s after a crash: put it on its feet.", min=0.0)] = None,
     seconds: Annotated[float | None, typer.Option(help="End by itself after so long.", min=0.0)] = None,
     json: Json = False,
     quiet: Quiet = False,

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 from lcd_flight.model import LinkContext
+from lcd_flight.model.frames import tilt_of
 from sim_bridge.crazyflie.options import CrazyflieOptions
 from sim_bridge.crazyflie.radio import Queue, Radio
 from sim_bridge.crazyflie.supervisor import State
@@ -41,7 +44,7 @@ class Bench:
         self._radio = Radio(options, context.seed)
         self._up, self._down = Queue(), Queue()
         self._began_ns: int | None = None
-        self._fell_ns: int | None = None
+        self._crashed_ns: int | None = None
         self._told: State | None = None
         self._said: list[str] = []
 
@@ -89,14 +92,14 @@ class Bench:
         if self._is_due(self._began_ns, self._options.die_s, now_ns) and self.vehicle.alive:
             self.vehicle.die()
             self._said.append("all power lost")
-        if not self.vehicle.body.fell_over:
-            self._fell_ns = None
-        elif self._fell_ns is None:
-            self._fell_ns = now_ns
-            self._said.append("it fell over")
-        elif self._is_due(self._fell_ns, self._options.upright_s, now_ns):
+        if not self.vehicle.body.broken:
+            self._crashed_ns = None
+        elif self._crashed_ns is None:
+            self._crashed_ns = now_ns
+            self._said.append(f"hit the floor, tilted by {math.degrees(tilt_of(self.vehicle.body.state.q_WB)):.0f} deg")
+        elif self._is_due(self._crashed_ns, self._options.upright_s, now_ns):
             self.vehicle.body.put_upright()
-            self._said.append("somebody put it upright")
+            self._said.append("put upright")
         self._tell()
 
     def _tell(self) -> None:

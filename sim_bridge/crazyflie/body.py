@@ -11,9 +11,9 @@ import random
 from typing import NamedTuple
 
 from lcd_flight.model import GRAVITY_M_PER_S2, Quaternion, State, Vector3, Vehicle
-from lcd_flight.model.frames import body_z_axis, conjugate, from_yaw, rotate, yaw_of
+from lcd_flight.model.frames import conjugate, from_yaw, rotate, yaw_of
 from sim_bridge.crazyflie.variants import FULL_SCALE, Variant
-from sim_bridge.plant import CRASH_UPRIGHT, Plant
+from sim_bridge.plant import Plant
 
 PERIOD_NS = 2_000_000
 """Of the onboard controller: 500 Hz."""
@@ -48,7 +48,6 @@ class Body:
         self._acceleration_bias = _draws(draws, ACCELEROMETER_BIAS)
         self._rate_bias = _draws(draws, GYRO_BIAS)
         self._state = standing
-        self._lies: Quaternion | None = None
         self.inertial = Inertial((0.0, 0.0, GRAVITY_M_PER_S2), (0.0, 0.0, 0.0))
 
     @property
@@ -59,11 +58,14 @@ class Body:
     @property
     def on_ground(self) -> bool:
         """Whether it stands or lies on the floor."""
-        return self._plant.on_ground
+        return self.broken or self._plant.on_ground
 
     @property
     def broken(self) -> bool:
-        """Whether it hit the floor and its motors stand still until somebody picks it up."""
+        """Whether it has crashed and lies on the floor, motors still, until somebody picks it up.
+
+        It hit the floor hard or tilted, or left what the model holds for.
+        """
         return self._plant.crashed
 
     @property
@@ -92,12 +94,8 @@ class Body:
         """Let one period pass."""
         before = self._state
         self._plant.advance(PERIOD_NS)
-        after = self._plant.state
-        if self._plant.crashed:
-            self._lies = before.q_WB if self._lies is None else self._lies
-            after = State(after.p_WB, (0.0, 0.0, 0.0), self._lies, (0.0, 0.0, 0.0))
-        self._state = after
-        self.inertial = self._measured(before, after)
+        self._state = self._lying(before) if self._plant.crashed else self._plant.state
+        self.inertial = self._measured(before, self._state)
 
     def warm_up(self) -> None:
         """Compile what flying needs: seconds the first time, which must not fall into somebody's connecting."""
@@ -110,18 +108,18 @@ class Body:
         standing = State((x, y, self._floor_m), rest, from_yaw(yaw_of(self._state.q_WB)), rest)
         battery_V = self._plant.battery_V
         self._plant = Plant(self._vehicle, standing, self._seed, battery_V=battery_V, floor_m=self._floor_m)
-        self._state, self._lies = standing, None
+        self._state = standing
 
-    @property
-    def fell_over(self) -> bool:
-        """Whether it lies on its side or its back."""
-        return self._lies is not None and body_z_axis(self._lies)[2] < CRASH_UPRIGHT
+    def _lying(self, before: State) -> State:
+        """On the floor, turned as it was when it crashed."""
+        x, y, _ = before.p_WB
+        rest = (0.0, 0.0, 0.0)
+        return State((x, y, self._floor_m), rest, before.q_WB, rest)
 
     def _measured(self, before: State, after: State) -> Inertial:
         """Standing, the floor carries it: its velocity does not change."""
         dv = [(b - a) / PERIOD_S for a, b in zip(before.v_WB_W, after.v_WB_W, strict=True)]
-        landed = self._plant.on_ground
-        free = (0.0, 0.0, GRAVITY_M_PER_S2) if landed else (dv[0], dv[1], dv[2] + GRAVITY_M_PER_S2)
+        free = (0.0, 0.0, GRAVITY_M_PER_S2) if self.on_ground else (dv[0], dv[1], dv[2] + GRAVITY_M_PER_S2)
         force = rotate(conjugate(after.q_WB), free)
         return Inertial(_sum(force, self._acceleration_bias), _sum(after.w_WB_B, self._rate_bias))
 

@@ -23,6 +23,8 @@ PROCESS_ACCELERATION = (0.5, 0.5, 1.0)
 GYRO_NOISE = (0.1, 0.1, 0.1)
 """rad/s, likewise of the body rates."""
 LARGEST_VARIANCE, SMALLEST_VARIANCE = 1e4, 1e-6
+SIGMAS = (1e-6, 1e6)
+"""Least and greatest standard deviation that a pose is believed to have, whatever the parameters say."""
 FARTHEST_M, FASTEST = 100.0, 10.0
 """Beyond these the firmware's filter starts anew (kalman_supervisor.c)."""
 
@@ -73,7 +75,9 @@ class Estimator:
     @staticmethod
     def fresh(position_m: Vector3 = (0.0, 0.0, 0.0), yaw_rad: float = 0.0) -> Estimator:
         """As after a reset: level, at rest, sure of nothing."""
-        values = zip(position_m, POSITION_VARIANCE, PROCESS_ACCELERATION, strict=True)
+        start = [_bounded(position, -FARTHEST_M, FARTHEST_M) for position in position_m]
+        yaw_rad = _bounded(yaw_rad, -math.tau, math.tau)
+        values = zip(start, POSITION_VARIANCE, PROCESS_ACCELERATION, strict=True)
         x, y, z = (_Axis(position, variance, sigma) for position, variance, sigma in values)
         return Estimator((x, y, z), from_yaw(yaw_rad))
 
@@ -100,7 +104,7 @@ class Estimator:
     @property
     def lost(self) -> bool:
         """Whether it has left what it can hold."""
-        return any(abs(axis.position) > FARTHEST_M or abs(axis.velocity) > FASTEST for axis in self.axes)
+        return not all(abs(axis.position) <= FARTHEST_M and abs(axis.velocity) <= FASTEST for axis in self.axes)
 
     def predict(self, measured: Inertial, *, position: bool) -> None:
         """One period of the inertial sensors."""
@@ -117,11 +121,13 @@ class Estimator:
 
     def see_position(self, p_WB: Vector3, sigma_m: float) -> None:
         """A position from outside."""
+        sigma_m = _bounded(sigma_m, *SIGMAS)
         for axis, measured in zip(self.axes, p_WB, strict=True):
             axis.correct(measured, sigma_m)
 
     def see_attitude(self, q_WB: Quaternion, sigma_rad: float) -> None:
         """An attitude from outside, any length but none: its difference as a small turn in the body."""
+        sigma_rad = _bounded(sigma_rad, *SIGMAS)
         x, y, z, w = multiply(conjugate(self.attitude), normalized(q_WB))
         sign = 2.0 if w >= 0.0 else -2.0
         turn = [0.0, 0.0, 0.0]
@@ -133,6 +139,6 @@ class Estimator:
         self.attitude = normalized(multiply(self.attitude, (turn[0], turn[1], turn[2], 1.0)))
 
 
-def _bounded(variance: float) -> float:
-    """Within what the firmware allows; what is no number becomes the largest."""
-    return min(max(variance, SMALLEST_VARIANCE), LARGEST_VARIANCE) if math.isfinite(variance) else LARGEST_VARIANCE
+def _bounded(value: float, low: float = SMALLEST_VARIANCE, high: float = LARGEST_VARIANCE) -> float:
+    """Within the limits, those of a variance unless others are given; what is no number becomes the larger one."""
+    return min(max(value, low), high) if not math.isnan(value) else high

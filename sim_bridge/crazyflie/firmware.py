@@ -45,6 +45,7 @@ class Firmware:
         self.estimator = self._fresh_estimator()
         self.now_ms = 0
         """Since it was switched on."""
+        self._used_poses = self._uses_poses
         self._pose = NOT_SEEN
         self._setpoint = NOTHING
         self._yaw_deg = 0.0
@@ -141,6 +142,9 @@ class Firmware:
         if self.parameters["kalman.resetEstimation"]:
             self.estimator = self._fresh_estimator()
             self._unsent.append(self.parameters.updated("kalman.resetEstimation", 0))
+        elif self._uses_poses != self._used_poses:
+            self.estimator = self._fresh_estimator()
+        self._used_poses = self._uses_poses
         self.estimator.predict(self._body.inertial, position=self._uses_poses)
         if self.estimator.lost:
             self.estimator = self._fresh_estimator()

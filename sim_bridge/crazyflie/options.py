@@ -36,4 +36,4 @@ class CrazyflieOptions(msgspec.Struct, frozen=True):
     die_s: Seconds | None = None
     """When all power is lost."""
     upright_s: Seconds | None = None
-    """After so long on its side somebody puts it on its feet; counts from the fall."""
+    """So long after a crash somebody puts it on its feet."""

@@ -88,8 +88,7 @@ _TABLE: dict[State, tuple[tuple[State, Callable[[Conditions], bool]], ...]] = {
         (State.LANDED, lambda c: not c.flying),
     ),
     State.LANDED: (
-        (State.FREE_FALL, lambda c: c.emergency),
-        (State.RESET, lambda c: c.rested or not c.armed),
+        (State.RESET, lambda c: c.rested),
         (State.FLYING, lambda c: c.flying),
     ),
     State.RESET: ((State.CHECKS_NOT_PASSED, _always),),

@@ -25,6 +25,8 @@ FALLBACK_SHARE = 0.95
 """Of the weight: it comes down slowly."""
 POSE_AGE_NS = 100_000_000
 """Up to here the heading is motion capture's, then the vehicle's own."""
+UNLOCK_S = 0.1
+"""Zero setpoints for so long before the control loop's: a lost one would leave the thrust locked."""
 STOPS_S = 0.1
 """For so long `stop` is repeated before the vehicle is left alone."""
 DESCENT_S = 10.0
@@ -119,6 +121,7 @@ class CrazyflieLink:
             raise RefusedError("the vehicle will not arm: its motors were stopped; connect anew")
         await arming.arm(self._connection.picture, sender.request, session.protocol, self._clock)
         sender.change(lambda box: box.unlock(self._clock.now_ns()))
+        await self._connection.pause(UNLOCK_S)
         await arming.ready_to_fly(self._connection.picture, self._clock)
         self._armed = True
 

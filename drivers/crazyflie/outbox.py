@@ -74,7 +74,7 @@ class Outbox:
         self._pose: bytes | None = None
         self._requests: deque[bytes] = deque(maxlen=100)
         self._fresh_ns = self._since_ns = self._repeat_ns = self._pose_ns = self._fed_ns = self._alive_ns = 0
-        self._descending = False
+        self._descending = self._unlocked = False
 
     def offer(self, packet: bytes, stamp_ns: int) -> None:
         """A fresh setpoint of the control loop, in place of one that may still be waiting."""
@@ -144,10 +144,11 @@ class Outbox:
         if self.latched or self.mode is mode:
             return
         self.mode, self._since_ns, self._repeat_ns, self._setpoint = mode, now_ns, now_ns, None
+        self._unlocked = False
 
     def _setpoint_due(self, now_ns: int) -> bytes | None:
         fresh = self._taken(now_ns)
-        if fresh is not None and self.mode in (Mode.UNLOCK, Mode.FLYING, Mode.FALLBACK):
+        if fresh is not None and (self.mode in (Mode.FLYING, Mode.FALLBACK) or self._unlocked):
             self.mode, self._fresh_ns = Mode.FLYING, now_ns
             self._repeat_ns = now_ns + FALLBACK_NS
             return fresh
@@ -175,6 +176,7 @@ class Outbox:
         self._repeat_ns = max(self._repeat_ns + PERIOD_NS, now_ns + PERIOD_NS // 2)
         match self.mode:
             case Mode.UNLOCK:
+                self._unlocked = True
                 return crtp_wire.UNLOCK
             case Mode.FALLBACK:
                 return self._fallback()

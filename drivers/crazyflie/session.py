@@ -34,6 +34,9 @@ _JOIN_S = 1.5
 class Session(Crazyflie):  # type: ignore[misc]  # cflib is untyped
     """One connection."""
 
+    link: Any
+    """cflib's driver; None while there is none."""
+
     def __init__(self, toc_cache: Path, clock: Clock) -> None:
         if not cflib.crtp.CLASSES:
             cflib.crtp.init_drivers()

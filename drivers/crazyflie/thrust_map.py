@@ -79,7 +79,8 @@ def thrust_map(name: str, vehicle: Vehicle) -> ThrustMap:
         InputError: neither `vehicle`, nor a map that ships, nor a file with one.
     """
     if name == "vehicle":
-        return ThrustMap(f"vehicle {vehicle.name}", 1, vehicle.source, full_scale_N=vehicle.max_thrust_N)
+        source = f"linear in force up to {vehicle.max_thrust_N:.3f} N, the largest thrust of vehicle {vehicle.name}"
+        return ThrustMap("vehicle", 1, source, full_scale_N=vehicle.max_thrust_N)
     shipped = _read(_FILE)
     if name in shipped:
         return _built(name, shipped[name], name)

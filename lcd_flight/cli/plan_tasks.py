@@ -46,6 +46,6 @@ def plan_tasks(
     segments = plans.trajectories.segments
     terminal.line("PLAN", f"{len(given):,} tasks of {segments} segments by {method} for {world}: {out}")
     if fell_back:
-        terminal.warn(f"{fell_back} of {len(given)} tasks are minimum snap: {method} found nothing better")
+        terminal.warn(f"{fell_back} of {len(given)} tasks: the solve found nothing better than minimum snap")
     facts = {"tasks": len(given), "segments": segments, "method": method, "fell_back": fell_back, "out": str(out)}
     return terminal.finish(Outcome.OK, facts)

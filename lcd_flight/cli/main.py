@@ -11,7 +11,7 @@ from pathlib import Path
 import typer
 from typer.exceptions import TyperException
 
-from lcd_flight.cli import bench, collect, evaluation, fly, learning, mission, plan, recover, replay, review, sim
+from lcd_flight.cli import bench, collect, evaluation, export, fly, learning, mission, plan, recover, replay, review, sim
 from lcd_flight.cli.terminal import Terminal
 from lcd_flight.errors import LcdError, Outcome
 
@@ -34,6 +34,7 @@ app.command("evaluate")(evaluation.evaluate)
 app.command("review")(review.review)
 app.command("replay")(replay.replay)
 app.command("recover")(recover.recover)
+app.command("export")(export.export)
 app.command("bench")(bench.bench)
 app.add_typer(sim.app, name="sim")
 

@@ -126,8 +126,6 @@ def _seen(
 
 def _decided(ros: RosMessages, tick: Tick, stamp_ns: int) -> Iterator[Stamped]:
     """What it decided."""
-    from lcd_flight.model.frames import from_yaw
-
     if tick.reference is not None:
         yield REFERENCE, stamp_ns, ros.pose(stamp_ns, tick.reference.p_W, from_yaw(tick.reference.yaw_rad))
     if tick.setpoint is not None:

@@ -8,11 +8,14 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 
-from lcd_flight.learning import dataset as dataset_module
-from lcd_flight.learning.dataset import Dataset, open_dataset, read_header
+from lcd_flight.learning import files, shard_file
+from lcd_flight.learning.dataset import Dataset, open_dataset
 from lcd_flight.learning.rollouts import Plans, Rollouts, Source
+from lcd_flight.learning.schema import COLUMNS
+from lcd_flight.learning.shard_file import read_header
 from lcd_flight.model import InputError, RolloutLabels
 
+ARROW = {"int64": "int64", "int8": "int8", "uint64": "uint64", "bool": "bool", "float32": "float"}
 CONFIGURATION = {"seed": 3, "world": {"name": "meadow", "speed": 2.0}, "drags": [1, 2]}
 
 
@@ -26,7 +29,8 @@ def rollouts(rows=20, seed=0):
     )
     plans = Plans(
         (1 << 40) + np.arange(rows),
-        np.full(rows, Source.SEARCH),
+        np.arange(rows) % 3 == 0,
+        np.where(np.arange(rows) < 5, Source.OPTIMUM, Source.SEARCH),
         column(24).astype(np.float32),
         column(3).astype(np.float32),
     )
@@ -34,7 +38,7 @@ def rollouts(rows=20, seed=0):
 
 
 def assert_equal(a, b):
-    for name in ("task", "source", "z", "theta"):
+    for name in Plans.__slots__:
         assert np.array_equal(getattr(a.plans, name), getattr(b.plans, name)), name
     assert np.array_equal(a.drag, b.drag)
     assert np.array_equal(a.noise_seed, b.noise_seed)
@@ -70,7 +74,25 @@ def test_each_shard_carries_its_configuration_and_the_versions(folder):
     assert metadata["configuration"] == CONFIGURATION
     assert metadata["hash"] == folder.hash
     assert metadata["shard"] == 1
-    assert {"lcd-flight", "numpy", "numba", "pyarrow", "python"} <= set(metadata["versions"])
+    assert {"lcd-flight", "numpy", "numba", "python"} <= set(metadata["flown_by"]["versions"])
+    assert metadata["flown_by"]["processor"]
+    assert "pyarrow" in metadata["written_by"]
+
+
+def test_a_shard_tells_its_sources_and_crashes(folder):
+    header = folder.header(0)
+    assert header.sources == {"optimum": 5, "search": 15}
+    assert header.crashed == int(rollouts(20, seed=0).labels.crashed.sum())
+    assert header.invalid == int((~rollouts(20, seed=0).labels.valid).sum())
+
+
+def test_columns_are_those_of_the_schema(folder):
+    table = pyarrow.parquet.read_table(folder.path(0))
+    assert table.column_names == [column.name for column in COLUMNS]
+    assert all(str(table.schema.field(c.name).type).startswith(ARROW[c.type]) for c in COLUMNS if not c.shape)
+    shapes = {c.name: table.schema.field(c.name).type.list_size for c in COLUMNS if c.shape}
+    assert shapes == {"z": 24, "theta": 3, "segment_max_error_m": 3, "waypoint_error_m": 4}
+    assert np.array_equal(table["crashed"].to_numpy(), rollouts(20, seed=0).labels.crashed)
 
 
 def test_the_same_rows_give_the_same_bytes(folder, tmp_path):
@@ -89,6 +111,7 @@ def test_a_shard_cut_short_is_named(folder, keep):
 
 
 def test_a_flipped_bit_is_found_when_the_rows_are_read(folder):
+    folder.write(0, rollouts(2_000))
     path = folder.path(0)
     data = bytearray(path.read_bytes())
     data[len(data) // 3] ^= 0x10
@@ -119,10 +142,18 @@ def test_a_foreign_parquet_file_is_refused(folder):
         read_header(folder.path(0))
 
 
-def test_another_schema_version_is_refused(folder, monkeypatch):
-    monkeypatch.setattr(dataset_module, "SCHEMA_VERSION", 2)
-    with pytest.raises(InputError, match="schema version 1, this program reads 2; collect the data anew"):
-        folder.rows(0)
+def test_a_foreign_name_is_refused(folder):
+    (folder.folder / "shard-old.parquet").write_bytes(folder.path(0).read_bytes())
+    with pytest.raises(InputError, match=r"shard-old\.parquet: not a shard of `lcd collect`, which has a number"):
+        folder.numbers()
+
+
+def test_an_older_schema_is_refused_with_the_remedy(folder, monkeypatch):
+    monkeypatch.setattr(shard_file, "SCHEMA_VERSION", 1)
+    folder.write(2, rollouts())
+    monkeypatch.undo()
+    with pytest.raises(InputError, match=r"schema version 1, this program reads 2; collect .* into another folder"):
+        folder.rows(2)
 
 
 def test_a_folder_without_shards_is_named(tmp_path):
@@ -136,11 +167,11 @@ def test_a_failed_write_leaves_the_old_shard_and_nothing_else(folder, monkeypatc
     def full_disk(_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(dataset_module.os, "fsync", full_disk)
+    monkeypatch.setattr(files.os, "fsync", full_disk)
     with pytest.raises(InputError, match=r"shard-00001\.parquet: cannot be written .*No space left"):
         folder.write(1, rollouts(20))
     assert folder.path(1).read_bytes() == before
-    assert not list(folder.folder.glob("*.partial"))
+    assert {p.name for p in folder.folder.iterdir()} == {"shard-00000.parquet", "shard-00001.parquet"}
 
 
 def test_a_place_that_is_a_file_is_named(tmp_path):

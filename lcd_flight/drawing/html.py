@@ -12,7 +12,7 @@ class Html(str):
     __slots__ = ()
 
 
-_EMPTY_TAGS = frozenset({"meta", "input", "rect", "line", "circle", "polyline", "polygon"})
+_EMPTY_TAGS = frozenset({"meta", "input", "rect", "circle", "polyline"})
 
 
 def tag(name: str, *children: str | None, **attributes: str | float | bool | None) -> Html:

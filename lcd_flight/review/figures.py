@@ -11,6 +11,8 @@ import numpy as np
 from lcd_flight.model import Leg, LegKind, Outcome, Phase
 from lcd_flight.model.types import BoolArray, FloatArray
 from lcd_flight.record import FlightLog, Series
+from lcd_flight.review.costs import SegmentFigures, segment_figures
+from lcd_flight.review.kinematics import attitude_error_rad, attitude_lag_s, tilt_rad
 from lcd_flight.review.spans import Span, airborne, span_name, spans, tracking
 
 
@@ -72,6 +74,12 @@ class FlightFigures:
     pose_age_max_s: float | None
     """In the air."""
     link_lost: int
+    max_attitude_error_rad: float | None
+    """Angle between setpoint and flown attitude, in the air."""
+    attitude_lag_s: float | None
+    """By how much the thrust direction follows its setpoint late."""
+    segments: tuple[SegmentFigures, ...]
+    """The planner's expectation beside what was flown."""
     phases: tuple[PhaseFigures, ...]
 
     def to_json(self) -> dict[str, Any]:
@@ -115,6 +123,9 @@ def figures_of(log: FlightLog) -> FlightFigures:
         pose_rejected=rejected,
         pose_age_max_s=_largest(series.pose_age_s[flying]),
         link_lost=int(series.link_counts[-1, 2]),
+        max_attitude_error_rad=_largest(attitude_error_rad(series)[flying]),
+        attitude_lag_s=attitude_lag_s(series),
+        segments=segment_figures(log),
         phases=tuple(_phase(log, span, error_m, speed) for span in spans(series)),
     )
 
@@ -127,11 +138,6 @@ def waypoint_errors_m(log: FlightLog) -> tuple[float | None, ...]:
         if leg.kind is LegKind.TRAJECTORY and leg.waypoints is not None
         for error in _leg_waypoint_errors_m(log.series, number, leg, leg.waypoints)
     )
-
-
-def tilt_rad(q_WB: FloatArray) -> FloatArray:
-    """(T,) angle between the body's z axis and the vertical, from (T, 4) attitudes."""
-    return np.arccos(np.clip(1.0 - 2.0 * (q_WB[:, 0] ** 2 + q_WB[:, 1] ** 2), -1.0, 1.0))
 
 
 def _leg_waypoint_errors_m(series: Series, number: int, leg: Leg, waypoints: FloatArray) -> list[float | None]:

@@ -1,22 +1,21 @@
-"""The report: one HTML file that needs no network, in light and dark, on a screen, a phone or paper."""
+"""The report of one flight: a page for a screen, a phone or paper, in light and dark."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from lcd_flight.drawing import colors
-from lcd_flight.drawing.html import Html, joined, tag
+from lcd_flight.drawing.html import Html, tag
 from lcd_flight.record import FlightLog
 from lcd_flight.review import sections
-from lcd_flight.review.assets import asset
-from lcd_flight.review.chart import Timeline, panel_html
-from lcd_flight.review.figures import FlightFigures, figures_of
+from lcd_flight.review.chart import panel_html
+from lcd_flight.review.document import document
+from lcd_flight.review.figures import figures_of
 from lcd_flight.review.histogram import lateness_html
-from lcd_flight.review.plots import panels, timeline
-from lcd_flight.review.view import baselines, path_drawing
-
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
-"""Nothing is ever loaded, whatever a log may hold."""
+from lcd_flight.review.player import space_buttons
+from lcd_flight.review.plots import panels
+from lcd_flight.review.space import Space, baselines, space_of
+from lcd_flight.review.timeline import timeline
+from lcd_flight.review.view import path_drawing
 
 
 def write_page(log: FlightLog, path: Path) -> Path:
@@ -31,66 +30,50 @@ def write_page(log: FlightLog, path: Path) -> Path:
 
 def page(log: FlightLog) -> Html:
     """The report as one HTML document."""
-    figures, line = figures_of(log), timeline(log)
-    head = tag(
-        "head",
-        tag("meta", charset="utf-8"),
-        tag("meta", name_="viewport", content="width=device-width, initial-scale=1"),
-        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
-        tag("title", f"{log.header.name}: flight report"),
-        tag("style", Html(colors() + asset("space.css") + asset("page.css"))),
-    )
-    body = tag(
-        "body",
-        tag("main", *_content(log, figures, line)),
-        tag("script", Html(asset("page.js"))),
-        data_begin=repr(line.axis.low),
-        data_end=repr(line.axis.high),
-    )
-    return joined([Html("<!DOCTYPE html>\n"), tag("html", head, body, lang="en")])
-
-
-def _content(log: FlightLog, figures: FlightFigures, line: Timeline) -> list[Html]:
-    plots = [panel_html(panel, line) for panel in panels(log)]
-    plots.append(lateness_html(log.series.lateness_s, figures.missed_ticks))
-    return [
+    figures, line, shown = figures_of(log), timeline(log), list(panels(log))
+    keys = [("flown", "flown"), ("reference", "reference")]
+    if baselines(log.header.plan):
+        keys.append(("baseline", "minimum snap"))
+    space = space_of([log], [0.0])
+    if space.fenced:
+        keys.append(("fence", "fence"))
+    if space.flown[0].saturated:
+        keys.append(("hot", "saturated"))
+    content = [
         sections.heading(log, figures),
         sections.warnings(log),
         sections.tiles(figures),
         tag(
             "div",
-            _path(log, line),
-            *plots,
+            path_panel(space, keys),
+            *(panel_html(panel, line) for panel in shown),
+            lateness_html(log.series.lateness_s, figures.missed_ticks),
             sections.phase_table(figures),
             sections.waypoint_table(log, figures),
+            sections.segment_table(figures),
             sections.finding_table(log),
             sections.configuration(log),
             class_="panels",
         ),
         tag("footer", f"Made by lcd-flight {log.header.versions.get('lcd-flight', '')} from {log.path.name}."),
     ]
+    return document(f"{log.header.name}: flight report", content, shown, line)
 
 
-def _path(log: FlightLog, line: Timeline) -> Html:
-    """The path, its legend and the slider that moves through the flight."""
-    keys = [("flown", "flown"), ("reference", "reference")]
-    if baselines(log.header.plan):
-        keys.append(("baseline", "minimum snap"))
-    slider = tag(
-        "input",
-        type="range",
-        min=repr(line.axis.low),
-        max=repr(line.axis.high),
-        step="0.01",
-        value=repr(line.axis.low),
-        aria_label="time in the flight",
-    )
+def path_panel(space: Space, keys: list[tuple[str, str]]) -> Html:
+    """The drawing with its legend, CSS class and name of each line, and its buttons."""
+    legend = (tag("span", tag("i", class_=f"key {style}"), name) for style, name in keys)
     return tag(
         "figure",
         tag("figcaption", "Path"),
-        tag("div", *(tag("span", tag("i", class_=f"key {style}"), name) for style, name in keys), class_="keys"),
-        path_drawing(log),
-        tag("div", slider, tag("output"), class_="player"),
-        tag("p", "Drag to turn, Ctrl and wheel to zoom, double-click to go back.", class_="note"),
-        class_="panel wide",
+        tag("div", *legend, class_="keys"),
+        path_drawing(space),
+        space_buttons(),
+        tag(
+            "p",
+            "Drag to turn, two fingers or Ctrl and wheel to zoom. In the charts: drag to zoom in time, two fingers or "
+            "Ctrl and wheel as well, double-click for the whole flight; everything follows.",
+            class_="note hint",
+        ),
+        class_="panel wide scene",
     )

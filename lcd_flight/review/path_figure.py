@@ -9,7 +9,8 @@ from lcd_flight.drawing.html import Html, tag
 from lcd_flight.record import FlightLog
 from lcd_flight.review.assets import asset
 from lcd_flight.review.figures import figures_of
-from lcd_flight.review.view import HEIGHT, WIDTH, baselines, path_drawing
+from lcd_flight.review.space import baselines, space_of
+from lcd_flight.review.view import HEIGHT, WIDTH, path_drawing
 
 _FOOT = 44
 """Height of the legend."""
@@ -32,7 +33,7 @@ def path_figure(log: FlightLog) -> Html:
         "svg",
         tag("style", Html(colors() + asset("space.css") + ".paper { fill: var(--card); }")),
         tag("rect", **size, rx=12, class_="paper"),
-        path_drawing(log),
+        path_drawing(space_of([log], [0.0]), still=True),
         tag("g", *_legend(log), class_="space", transform=f"translate(28,{HEIGHT + _FOOT // 2 - 4})"),
         xmlns="http://www.w3.org/2000/svg",
         viewBox=f"0 0 {WIDTH} {HEIGHT + _FOOT}",

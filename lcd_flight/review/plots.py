@@ -1,98 +1,124 @@
-"""Which charts a flight is shown in."""
+"""Which charts a flight is shown in: how it moved, against what it should have done. `health.py` has the rest."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from lcd_flight.drawing.scale import Axis, axis_around
-from lcd_flight.model import Severity
-from lcd_flight.model.types import BoolArray, FloatArray
+from lcd_flight.model import CRASH_ERROR_M
+from lcd_flight.model.types import FloatArray
 from lcd_flight.record import FlightLog, Series
-from lcd_flight.review.chart import Band, Chart, Flag, Panel, Rule, Timeline, Trace
-from lcd_flight.review.spans import airborne, span_name, spans
+from lcd_flight.review.chart import Chart, Panel, Rule, Trace
+from lcd_flight.review.costs import SegmentFigures, segment_figures
+from lcd_flight.review.health import health
+from lcd_flight.review.kinematics import (
+    attitude_error_rad,
+    attitude_lag_s,
+    euler_deg,
+    reference_rates,
+    thrust_direction_error_rad,
+)
 
-_BEFORE_TAKEOFF_S = 2.0
-"""How much of the time on the ground is shown: a pilot may have waited for minutes."""
+LEAST_ERROR_M = 1e-3
+"""Lower end of logarithmic axes of errors."""
 
-_FLAGS = {Severity.INFO: "info", Severity.WARN: "warn"}
-_AXES = ("x", "y", "z")
-
-
-def timeline(log: FlightLog) -> Timeline:
-    """The time shown: from just before take-off, or all of it where there was none."""
-    series = log.series
-    flying = np.flatnonzero(airborne(series))
-    begin_s = max(0.0, float(series.time_s[flying[0]]) - _BEFORE_TAKEOFF_S) if len(flying) else 0.0
-    axis = Axis(begin_s, max(float(series.time_s[-1]), begin_s + 0.1))
-    shown = [span for span in spans(series) if span.end_s > begin_s]
-    phases = [
-        Band(
-            span_name(span, log.header.plan),
-            span.begin_s,
-            span.end_s,
-            f"phase-{number % 2}" if span.phase.airborne else "ground",
-        )
-        for number, span in enumerate(shown)
-    ]
-    flags = [
-        Flag(found.finding.message, found.begin_s, _FLAGS.get(found.finding.severity, "severe"))
-        for found in log.findings
-        if found.begin_s >= begin_s
-    ]
-    return Timeline(series.time_s, axis, phases, flags)
+AXES = ("x", "y", "z")
+ANGLES = ("roll", "pitch", "yaw")
 
 
 def panels(log: FlightLog) -> Iterator[Panel]:
     """All panels, in the order of the page."""
     series = log.series
     yield _error(log)
-    yield _axes("Position", "m", series.p_WB, series.reference_p_W, least=0.2)
-    yield _axes("Velocity", "m/s", series.v_WB_W, series.reference_v_W, least=0.2)
+    yield from _cost(series, segment_figures(log))
+    yield _axes("Position", "m", series, series.p_WB, series.reference_p_W, played=True)
+    yield _axes("Velocity", "m/s", series, series.v_WB_W, series.reference_v_W)
     yield _attitude(series)
     yield _rates(series)
-    yield _thrust(log)
-    yield from _health(log)
+    yield _lag(series)
+    yield from health(log)
 
 
-def euler_deg(q: FloatArray) -> FloatArray:
-    """(T, 3) roll, pitch and yaw (unwrapped) in degrees from (T, 4) attitudes; turned about z, then y, then x."""
-    x, y, z, w = q.T
-    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-    pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
-    yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    known = np.isfinite(yaw)
-    yaw[known] = np.unwrap(yaw[known])
-    return np.asarray(np.degrees(np.stack([roll, pitch, yaw], axis=1)))
+def error_axis(*errors_m: FloatArray) -> Axis:
+    """By powers of ten, so that centimetres of tracking and the crash bound are both legible."""
+    known = np.concatenate([error_m[np.isfinite(error_m)] for error_m in errors_m])
+    return Axis(LEAST_ERROR_M, max(3.0, 1.3 * float(known.max(initial=0.0))), log=True)
+
+
+def error_rules(log: FlightLog) -> list[Rule]:
+    """The crash bound, and the flight's own limits where they are others."""
+    limits = log.header.limits
+    levels = {limits.max_position_error_m: "land at once", limits.brake_position_error_m: "brake"}
+    crash = f"{CRASH_ERROR_M:g} m: crash bound"
+    if CRASH_ERROR_M in levels:
+        crash += f", {levels.pop(CRASH_ERROR_M)}"
+    return [
+        Rule(crash, CRASH_ERROR_M, "limit"),
+        *(Rule(f"{value:g} m: {words}", value, "warning") for value, words in levels.items()),
+    ]
 
 
 def _error(log: FlightLog) -> Panel:
-    limits, predicted = log.header.limits, log.header.predicted_max_error_m
-    error_m = log.series.error_m
-    known = error_m[np.isfinite(error_m)]
-    top = max(3.0, 1.3 * float(known.max(initial=0.0)))
-    rules = [
-        Rule(f"{limits.max_position_error_m:g} m: land at once", limits.max_position_error_m, "limit"),
-        Rule(f"{limits.brake_position_error_m:g} m: brake", limits.brake_position_error_m, "warning"),
-    ]
+    series, predicted = log.series, log.header.predicted_max_error_m
+    rules = error_rules(log)
     if predicted is not None:
         rules.append(Rule(f"{predicted:.2f} m: rehearsed maximum", predicted, "note"))
-    trace = Trace("distance from the reference", np.maximum(error_m, 1e-3), "flown")
-    chart = Chart("Error", "m, by powers of ten", [trace], Axis(1e-3, top, log=True), rules)
+    trace = Trace("from the reference", series.time_s, np.maximum(series.error_m, LEAST_ERROR_M), "flown")
+    chart = Chart("Distance", "m, by powers of ten", [trace], error_axis(series.error_m), rules)
     return Panel("Position error", [chart], wide=True)
 
 
-def _axes(title: str, unit: str, flown: FloatArray, reference: FloatArray, least: float) -> Panel:
-    """Flown against reference, an axis of the world each."""
+def _cost(series: Series, segments: Sequence[SegmentFigures]) -> Iterator[Panel]:
+    """Steps over the time of each segment; nothing where no trajectory was flown."""
+    traces = [
+        Trace(name, series.time_s, values, style)
+        for name, attribute, style in (
+            ("minimum snap predicted", "minimum_snap_predicted_m", "baseline"),
+            ("predicted", "predicted_m", "reference"),
+            ("measured", "measured_m", "flown"),
+        )
+        for values in [_steps(series, segments, attribute)]
+        if np.isfinite(values).any()
+    ]
+    if not traces:
+        return
+    axis = Axis(LEAST_ERROR_M * 10.0, error_axis(*(trace.values for trace in traces)).high, log=True)
+    note = (
+        "The largest error of each segment as the tracking cost means it: with a share of the yaw error, between 1 cm "
+        "and 5 m. Predicted: by the planner, before the flight."
+    )
+    rules = [Rule(f"{CRASH_ERROR_M:g} m: crash bound", CRASH_ERROR_M, "limit")]
+    chart = Chart("Error of the segment", "m, by powers of ten", traces, axis, rules)
+    yield Panel("Tracking cost, predicted and measured", [chart], note, wide=True)
+
+
+def _steps(series: Series, segments: Sequence[SegmentFigures], attribute: str) -> FloatArray:
+    """(T,) each segment's value while it was flown."""
+    values = np.full(len(series), np.nan)
+    for row in segments:
+        value = getattr(row, attribute)
+        if value is not None and row.begin_s is not None and row.end_s is not None:
+            values[(series.time_s >= row.begin_s) & (series.time_s < row.end_s)] = value
+    return values
+
+
+def _axes(
+    title: str, unit: str, series: Series, flown: FloatArray, reference: FloatArray, played: bool = False
+) -> Panel:
+    """Flown against reference, an axis of the world each; `played`: the path is played by these."""
     charts = [
         Chart(
             name,
             unit,
-            [Trace("reference", reference[:, axis], "reference"), Trace("flown", flown[:, axis], "flown")],
-            axis_around(flown[:, axis], reference[:, axis], least=least),
+            [
+                Trace("reference", series.time_s, reference[:, axis], "reference", f"0/reference-{name}" * played),
+                Trace("flown", series.time_s, flown[:, axis], "flown", f"0/{name}" * played),
+            ],
+            axis_around(flown[:, axis], reference[:, axis], least=0.2),
         )
-        for axis, name in enumerate(_AXES)
+        for axis, name in enumerate(AXES)
     ]
     return Panel(title, charts)
 
@@ -100,81 +126,52 @@ def _axes(title: str, unit: str, flown: FloatArray, reference: FloatArray, least
 def _attitude(series: Series) -> Panel:
     flown, asked = euler_deg(series.q_WB), euler_deg(series.setpoint_q_WB)
     # Each was unwrapped on its own: bring the setpoint's yaw to the turn that the vehicle is on.
-    difference = np.nanmedian(flown[:, 2] - asked[:, 2]) if np.isfinite(flown[:, 2] - asked[:, 2]).any() else 0.0
-    asked[:, 2] += 360.0 * round(float(difference) / 360.0)
+    difference = flown[:, 2] - asked[:, 2]
+    turns = np.nanmedian(difference) / 360.0 if np.isfinite(difference).any() else 0.0
+    asked[:, 2] += 360.0 * round(float(turns))
     charts = [
         Chart(
             name,
             "°",
-            [Trace("setpoint", asked[:, axis], "reference"), Trace("flown", flown[:, axis], "flown")],
+            [
+                Trace("setpoint", series.time_s, asked[:, axis], "reference"),
+                Trace("flown", series.time_s, flown[:, axis], "flown", f"0/{name}"),
+            ],
             axis_around(flown[:, axis], asked[:, axis], least=10.0),
         )
-        for axis, name in enumerate(("roll", "pitch", "yaw"))
+        for axis, name in enumerate(ANGLES)
     ]
     return Panel("Attitude", charts)
 
 
 def _rates(series: Series) -> Panel:
-    rates = np.degrees(series.w_WB_B)
+    flown, reference = np.degrees(series.w_WB_B), np.degrees(reference_rates(series))
     charts = [
-        Chart(name, "°/s", [Trace("flown", rates[:, axis], "flown")], axis_around(rates[:, axis], least=20.0))
-        for axis, name in enumerate(_AXES)
+        Chart(
+            name,
+            "°/s",
+            [
+                Trace("reference", series.time_s, reference[:, axis], "reference"),
+                Trace("flown", series.time_s, flown[:, axis], "flown"),
+            ],
+            axis_around(flown[:, axis], reference[:, axis], least=20.0),
+        )
+        for axis, name in enumerate(AXES)
     ]
-    return Panel("Body rates", charts)
+    return Panel("Body rates", charts, "Reference: the rates that following the trajectory exactly would take.")
 
 
-def _thrust(log: FlightLog) -> Panel:
-    series, vehicle = log.series, log.header.vehicle
-    saturated = [
-        Band("saturated", begin, end, "saturated") for begin, end in _stretches(series.time_s, series.saturated)
-    ]
-    rules = [Rule("full thrust", vehicle.max_thrust_N, "limit"), Rule("weight", vehicle.weight_N, "note")]
-    thrust = Chart(
-        "Collective thrust",
-        "N",
-        [Trace("setpoint", series.setpoint_thrust_N, "flown")],
-        Axis(0.0, 1.1 * vehicle.max_thrust_N),
-        rules,
-        saturated,
+def _lag(series: Series) -> Panel:
+    angle, tilted = np.degrees(attitude_error_rad(series)), np.degrees(thrust_direction_error_rad(series))
+    top = max(10.0, 1.1 * float(np.nanmax(angle, initial=0.0)))
+    lag_s = attitude_lag_s(series)
+    note = (
+        "The setpoint hardly moved: no delay can be told."
+        if lag_s is None
+        else f"In flight the thrust direction follows its setpoint {1e3 * lag_s:.0f} ms late."
     )
-    if not np.isfinite(series.motor_shares).any():
-        return Panel("Thrust and saturation", [thrust], "Shaded: a motor or the thrust command at its limit.")
-    motors = [
-        Trace(f"motor {number + 1}", 100.0 * series.motor_shares[:, number], style)
-        for number, style in zip(range(series.motor_shares.shape[1]), "abcd", strict=False)
+    traces = [
+        Trace("attitude", series.time_s, angle, "reference"),
+        Trace("thrust direction alone", series.time_s, tilted, "flown"),
     ]
-    shares = Chart("Motor commands", "% of full scale", motors, Axis(0.0, 105.0), [], saturated)
-    return Panel("Thrust and saturation", [thrust, shares], "Shaded: a motor or the thrust command at its limit.")
-
-
-def _health(log: FlightLog) -> Iterator[Panel]:
-    series, limits = log.series, log.header.limits
-    if np.isfinite(series.battery_V).any():
-        rules = [
-            Rule("warning", limits.battery_warning_V, "warning"),
-            Rule("critical", limits.battery_critical_V, "limit"),
-        ]
-        levels = np.array([rule.value for rule in rules])
-        axis = axis_around(series.battery_V, levels, least=0.2)
-        yield Panel("Battery", [Chart("Battery", "V", [Trace("voltage", series.battery_V, "flown")], axis, rules)])
-    age_ms = 1e3 * series.pose_age_s
-    rules = [
-        Rule("coasting ends: brake", 1e3 * limits.pose_coast_s, "warning"),
-        Rule("pose lost", 1e3 * limits.pose_timeout_s, "limit"),
-    ]
-    top = max(20.0, 1.2 * float(np.nanmax(age_ms, initial=0.0)))
-    age = Chart("Age of the pose", "ms", [Trace("since the newest frame", age_ms, "flown")], Axis(0.0, top), rules)
-    yield Panel("Motion capture", [age])
-
-
-def _stretches(time_s: FloatArray, flags: BoolArray) -> list[tuple[float, float]]:
-    """Begin and end of each stretch of true flags, a tick at least; gaps too small to see are closed."""
-    tick_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.01
-    gap_s = max(tick_s, (float(time_s[-1]) - float(time_s[0])) / 500.0)
-    found: list[tuple[float, float]] = []
-    for begin_s in time_s[flags].tolist():
-        if found and begin_s - found[-1][1] <= gap_s:
-            found[-1] = (found[-1][0], begin_s + tick_s)
-        else:
-            found.append((begin_s, begin_s + tick_s))
-    return found
+    return Panel("Attitude lag", [Chart("Angle to the setpoint", "°", traces, Axis(0.0, top))], note)

@@ -33,27 +33,27 @@ def heading(log: FlightLog, figures: FlightFigures) -> Html:
     )
 
 
-def warnings(log: FlightLog) -> Html:
-    """What the reader must know before believing the rest."""
+def warnings(log: FlightLog, *, named: bool = False) -> Html:
+    """What the reader must know before believing the rest; `named`: of which log."""
     if log.complete:
         return Html("")
-    return tag("p", "This log was cut: the last moments before the cut may be missing.", class_="alert")
+    which = log.path.name if named else "This log"
+    return tag("p", f"{which} was cut: the last moments before the cut may be missing.", class_="alert")
 
 
 def tiles(figures: FlightFigures) -> Html:
     """The numbers that matter most."""
     reached = [error for error in figures.waypoint_errors_m if error is not None]
-    flown, predicted = figures.max_position_error_m, figures.predicted_max_error_m
     shown = [
         ("RMS error on the trajectories", metres(figures.position_rmse_m)),
-        ("largest error on the trajectories", metres(flown)),
-        ("largest error in rehearsal", metres(predicted)),
+        ("largest error on the trajectories", metres(figures.max_position_error_m)),
+        ("largest error in rehearsal", metres(figures.predicted_max_error_m)),
         (f"worst of {len(reached)}/{len(figures.waypoint_errors_m)} waypoints", metres(max(reached, default=None))),
         ("of the flight saturated", share(figures.saturation_share)),
         ("in the air", f"{figures.duration_s:.1f} s"),
         ("top speed", number(figures.max_speed, "m/s")),
-        ("lateness of ticks, 99 %", f"{1e3 * figures.lateness_p99_s:.2f} ms"),
-        ("ticks missed", f"{figures.missed_ticks} of {figures.ticks}"),
+        ("attitude late by", milliseconds(figures.attitude_lag_s)),
+        (f"of {figures.ticks} ticks missed", str(figures.missed_ticks)),
         ("lowest battery", number(figures.battery_min_V, "V")),
     ]
     return tag(
@@ -64,21 +64,43 @@ def tiles(figures: FlightFigures) -> Html:
 
 
 def phase_table(figures: FlightFigures) -> Html:
-    """A row for each phase."""
+    """A row for each phase; the script zooms to the one that is clicked."""
     rows = [
-        (
-            row.name,
-            f"{row.begin_s:.2f} s",
-            f"{row.duration_s:.2f} s",
-            metres(row.rmse_m),
-            metres(row.max_error_m),
-            number(row.max_speed, "m/s"),
-            share(row.saturation_share),
+        row_of(
+            (
+                row.name,
+                f"{row.begin_s:.2f} s",
+                f"{row.duration_s:.2f} s",
+                metres(row.rmse_m),
+                metres(row.max_error_m),
+                number(row.max_speed, "m/s"),
+                share(row.saturation_share),
+            ),
+            data_begin=f"{row.begin_s:.3f}",
+            data_end=f"{row.begin_s + row.duration_s:.3f}",
+            data_zoom=True,
         )
         for row in figures.phases
     ]
     head = ("phase", "begins", "lasts", "RMS error", "largest error", "top speed", "saturated")
     return card("Phases", table(head, rows))
+
+
+def segment_table(figures: FlightFigures) -> Html:
+    """A row for each segment: what the planner expected and what came."""
+    predictions = {
+        "predicted": [row.predicted_m for row in figures.segments],
+        "measured": [row.measured_m for row in figures.segments],
+        "minimum snap predicted": [row.minimum_snap_predicted_m for row in figures.segments],
+    }
+    known = {name: values for name, values in predictions.items() if any(value is not None for value in values)}
+    if not known:
+        return Html("")
+    names = [f"{row.segment + 1} of {_segments(figures, row.leg)}" for row in figures.segments]
+    rows = [row_of((name, *map(metres, values))) for name, *values in zip(names, *known.values(), strict=True)]
+    head = ("segment", *known)
+    words = "Largest errors as the tracking cost means them: with a share of the yaw error, from 1 cm to 5 m."
+    return card("Tracking cost", table(head, rows), tag("p", words, class_="note"))
 
 
 def waypoint_table(log: FlightLog, figures: FlightFigures) -> Html:
@@ -90,14 +112,14 @@ def waypoint_table(log: FlightLog, figures: FlightFigures) -> Html:
         for point, time_s in zip(leg.waypoints.tolist(), leg.trajectory.knot_times_s.tolist(), strict=False)
     ]
     rows = [
-        (str(n), *(f"{value:.2f}".replace("-", MINUS) for value in point[:3]), f"{time_s:.2f} s", metres(error))
+        row_of((str(n), *(f"{value:.2f}".replace("-", MINUS) for value in point[:3]), f"{time_s:.2f} s", metres(error)))
         for n, ((point, time_s), error) in enumerate(zip(planned, figures.waypoint_errors_m, strict=False), start=1)
     ]
     return card("Waypoints", table(("waypoint", "x, m", "y, m", "z, m", "planned at", "distance then"), rows))
 
 
 def finding_table(log: FlightLog) -> Html:
-    """A row for each finding."""
+    """A row for each finding; the script goes to the time of the one that is clicked."""
     if not log.findings:
         return card("Findings", tag("p", "None: nothing was out of the ordinary.", class_="note"), wide=True)
     rows = [
@@ -107,6 +129,8 @@ def finding_table(log: FlightLog) -> Html:
             tag("td", found.finding.severity.name.lower(), class_=_SEVERITIES.get(found.finding.severity, "severe")),
             tag("td", f"{found.end_s - found.begin_s:.2f} s" if found.end_s > found.begin_s else "one tick"),
             tag("td", f"{found.finding.code}: {found.finding.message}", class_="text"),
+            data_begin=f"{found.begin_s:.3f}",
+            data_end=f"{found.end_s:.3f}",
         )
         for found in log.findings
     ]
@@ -143,10 +167,14 @@ def card(title: str, *content: Html, wide: bool = False) -> Html:
     return tag("section", tag("h2", title), *content, class_="card wide" if wide else "card")
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> Html:
+def table(head: Sequence[str], rows: Iterable[Html]) -> Html:
     """A table that scrolls sideways on its own."""
-    lines = [tag("tr", *(tag("td", cell) for cell in row)) for row in rows]
-    return tag("div", tag("table", tag("tr", *(tag("th", text) for text in head)), *lines), class_="scroll")
+    return tag("div", tag("table", tag("tr", *(tag("th", text) for text in head)), *rows), class_="scroll")
+
+
+def row_of(cells: Iterable[str], **attributes: str | bool) -> Html:
+    """A row of a table."""
+    return tag("tr", *(tag("td", cell) for cell in cells), **attributes)
 
 
 def definitions(facts: Mapping[str, str]) -> Html:
@@ -164,9 +192,18 @@ def number(value: float | None, unit: str) -> str:
     return NOTHING if value is None else f"{value:.2f} {unit}"
 
 
+def milliseconds(value_s: float | None) -> str:
+    """A short time."""
+    return NOTHING if value_s is None else f"{1e3 * value_s:.0f} ms"
+
+
 def share(value: float | None) -> str:
     """A share in per cent."""
     return NOTHING if value is None else f"{100.0 * value:.1f} %"
+
+
+def _segments(figures: FlightFigures, leg: int) -> int:
+    return sum(row.leg == leg for row in figures.segments)
 
 
 def _folded(title: str, text: str) -> Html:

@@ -1,146 +1,247 @@
-"""The report in a real browser: no script error, nothing empty, and it turns and reads out."""
+"""The report in a real browser: no script error, nothing empty, and it plays, zooms, turns and reads out.
+
+Screenshots are kept in build/review for people to look at.
+"""
 
 from __future__ import annotations
 
-import html
-import json
-import re
-import shutil
-import subprocess
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
+import browser
+import numpy as np
 import pytest
 import synthetic_flight
+from browser import Tab
 from synthetic_flight import log_of
 
-from lcd_flight.review.page import page
+from lcd_flight.model import Finding, Severity
+from lcd_flight.record import FlightLog
+from lcd_flight.review import write_comparison, write_page
 
-BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+pytestmark = browser.needs_browser
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.skipif(BROWSER is None, reason="no chromium: apt-get install chromium"),
-]
+PICTURES = Path(__file__).resolve().parents[2] / "build" / "review"
 
-PROBE = """
-<script>
-const found = { errors: [] };
-window.addEventListener("error", (event) => found.errors.push(event.message));
-const line = document.querySelector(".space polyline.flown");
-const drawing = document.querySelector(".space");
-const places = () => line.getAttribute("points");
-window.requestAnimationFrame = (draw) => setTimeout(draw, 10);  // nothing is painted without a screen
-const frames = () => new Promise((done) => setTimeout(done, 50));
-const outputs = () => [...document.querySelectorAll(".chart output")].map((output) => output.textContent);
-async function probe() {
-  found.live = document.body.classList.contains("live");
-  found.python = places();
-  found.boxes = [...document.querySelectorAll(".trace")].map((trace) => {
-    const box = trace.getBoundingClientRect();
-    return [box.width, box.height];
-  });
-  found.overflow = document.documentElement.scrollWidth - document.documentElement.clientWidth;
-  drawing.dispatchEvent(new MouseEvent("dblclick"));
-  await frames();
-  found.script = places();
-  drawing.setPointerCapture = () => {};
-  drawing.hasPointerCapture = () => true;
-  drawing.dispatchEvent(new PointerEvent("pointermove", { movementX: 60, movementY: 15 }));
-  await frames();
-  found.turned = places();
-  drawing.dispatchEvent(new WheelEvent("wheel", { deltaY: -100, ctrlKey: true, cancelable: true }));
-  await frames();
-  found.zoomed = places();
-  const now = drawing.querySelector(".now");
-  found.before = now.getAttribute("transform");
-  const slider = document.querySelector(".player input");
-  slider.value = 5.0;
-  slider.dispatchEvent(new Event("input"));
-  found.after = now.getAttribute("transform");
-  found.outputs = outputs();
-  found.clock = document.querySelector(".player output").textContent;
-  const result = document.createElement("pre");
-  result.id = "found";
-  result.textContent = JSON.stringify(found);
-  document.body.append(result);
-}
-probe();
-</script>
-"""
+FINE = "document.body.classList.contains('fine')"
+CLOCK = "document.querySelector('.clock').textContent"
+PATH = "document.querySelector('.space .path').getAttribute('points')"
+VIEW = "document.querySelector('.plot svg').getAttribute('viewBox').split(' ').map(Number)"
+CLEAR = [0.0, 0.0, 2000.0, 1000.0]
 
-
-def browse(path: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Open a page without a screen and without a network."""
-    assert BROWSER is not None
-    command = [
-        BROWSER,
-        "--headless",
-        "--no-sandbox",
-        "--disable-gpu",
-        "--disable-background-networking",
-        "--no-first-run",
-        "--enable-logging=stderr",
-        f"--user-data-dir={path.parent / 'profile'}",
-        *arguments,
-        path.as_uri(),
-    ]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+FINDING_S = 5.0
+GAP = Finding("pose_gap", Severity.WARN, "pose gap 42 ms (limit 300 ms)")
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """What a script saw that handled the page."""
-    path = tmp_path_factory.mktemp("page") / "report.html"
-    path.write_text(page(log_of(synthetic_flight.flight())).replace("</body>", PROBE + "</body>"), encoding="utf-8")
-    done = browse(path, "--window-size=1200,900", "--virtual-time-budget=5000", "--dump-dom")
-    assert "CONSOLE" not in done.stderr, done.stderr
-    result = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.DOTALL)
-    assert result is not None, done.stdout[-2000:]
-    answer: dict[str, Any] = json.loads(html.unescape(result[1]))
-    return answer
+def log() -> FlightLog:
+    return log_of(synthetic_flight.with_finding(synthetic_flight.flight(), 500, 504, GAP))
+
+
+@pytest.fixture(scope="module")
+def report(log: FlightLog, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_page(log, tmp_path_factory.mktemp("page") / "report.html")
+
+
+@pytest.fixture(scope="module")
+def window(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    with browser.opened(tmp_path_factory.mktemp("browser")) as tab:
+        yield tab
+
+
+@pytest.fixture
+def tab(window: Tab, report: Path) -> Iterator[Tab]:
+    """The report, just opened on a desk; at the end nothing may have complained."""
+    window.screen(1280, 900)
+    window.open(report, FINE)
+    window.settle()
+    yield window
+    assert window.errors == []
 
 
 def numbers(points: str) -> list[float]:
-    return [float(number) for number in re.split("[ ,]", points)]
+    return [float(number) for number in points.replace(",", " ").split()]
 
 
-def test_no_script_error(found: dict[str, Any]) -> None:
-    assert found["errors"] == []
-    assert found["live"] is True
+def shown_s(tab: Tab, log: FlightLog) -> tuple[float, float]:
+    """The window of time, from the drawing's view box."""
+    left, _, width, _ = tab.ask(VIEW)
+    whole_s = float(log.series.time_s[-1])
+    return left / 2000 * whole_s, (left + width) / 2000 * whole_s
 
 
-def test_no_trace_is_empty(found: dict[str, Any]) -> None:
-    assert len(found["boxes"]) >= 20
-    assert all(width > 100 for width, _ in found["boxes"])
-    assert sum(height > 5 for _, height in found["boxes"]) >= 12
+def middle(tab: Tab, selector: str) -> tuple[float, float, float]:
+    """Middle of an element, and its width."""
+    left, top, width, height = tab.box(selector)
+    return left + width / 2, top + height / 2, width
 
 
-def test_script_and_still_draw_the_same_path(found: dict[str, Any]) -> None:
-    assert numbers(found["script"]) == pytest.approx(numbers(found["python"]), abs=0.25)
+def test_no_trace_is_empty_and_a_picture_is_kept(tab: Tab) -> None:
+    boxes = tab.ask(
+        "[...document.querySelectorAll('.trace')].map((t) => t.getBoundingClientRect()).map((b) => [b.width, b.height])"
+    )
+    assert len(boxes) >= 25
+    assert all(width > 100 for width, _ in boxes)
+    assert sum(height > 5 for _, height in boxes) >= 14
+    assert tab.picture(PICTURES / "desk.png").stat().st_size > 20_000
+    tab.screen(1280, tab.ask("document.documentElement.scrollHeight"))
+    tab.settle()
+    tab.picture(PICTURES / "desk_whole.png")
+    tab.screen(1280, 900, dark=True)
+    tab.settle()
+    background = tab.ask("getComputedStyle(document.body).backgroundColor")
+    assert max(numbers(background.strip("rgb()").replace(",", " "))) < 64.0
+    tab.picture(PICTURES / "dark.png")
 
 
-def test_the_path_turns_and_zooms(found: dict[str, Any]) -> None:
-    assert found["turned"] != found["script"]
-    assert found["zoomed"] != found["turned"]
+def test_script_and_still_draw_the_same_path(tab: Tab) -> None:
+    still = tab.ask(PATH)
+    tab.click("[data-do=space-top]")
+    assert tab.ask(PATH) != still
+    tab.click("[data-do=space-home]")
+    assert numbers(tab.ask(PATH)) == pytest.approx(numbers(still), abs=0.25)
 
 
-def test_one_instant_moves_through_path_and_charts(found: dict[str, Any]) -> None:
-    assert found["after"] != found["before"]
-    assert found["clock"] == "5.00 s"
-    values = found["outputs"]
-    assert len(values) == len(found["boxes"])
-    assert float(values[0]) == pytest.approx(0.1, rel=0.02)  # the error, read back from its logarithmic axis
-    _, tick = synthetic_flight.flight()[500]
-    assert tick.reference is not None
-    read = [float(text.replace("\N{MINUS SIGN}", "-")) for text in values[1:7:2]]
-    assert read == pytest.approx(tick.reference.p_W, abs=0.03)
+def test_the_path_turns_and_zooms(tab: Tab) -> None:
+    before = tab.ask(PATH)
+    x, y, _ = middle(tab, ".space")
+    tab.drag(x, y, x + 80, y + 20)
+    turned = tab.ask(PATH)
+    assert turned != before
+    tab.click("[data-do=space-in]")
+    spread = [np.ptp(numbers(points)[::2]) for points in (turned, tab.ask(PATH))]
+    assert spread[1] == pytest.approx(1.3 * spread[0], rel=0.01)
+    tab.mouse("mouseWheel", x, y, deltaX=0, deltaY=-100, modifiers=2)
+    tab.settle()
+    assert np.ptp(numbers(tab.ask(PATH))[::2]) > 1.2 * spread[1]
 
 
-def test_a_phone_needs_no_scrolling_sideways(tmp_path: Path) -> None:
-    path = tmp_path / "report.html"
-    path.write_text(page(log_of(synthetic_flight.flight())).replace("</body>", PROBE + "</body>"), encoding="utf-8")
-    done = browse(path, "--window-size=500,900", "--virtual-time-budget=5000", "--dump-dom")
-    result = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.DOTALL)
-    assert result is not None
-    assert json.loads(html.unescape(result[1]))["overflow"] == 0
+def test_playing_moves_the_vehicle_and_the_cursors(tab: Tab) -> None:
+    place = "document.querySelector('.now circle:not(.target)').getAttribute('cx')"
+    cursor = "document.querySelector('.cursor').style.left"
+    tab.ask("(() => { document.querySelector('.speed').value = '10'; })()")
+    before = tab.ask(f"[{CLOCK}, {place}, {cursor}]")
+    tab.click("[data-do=play]")
+    tab.until(f"parseFloat({CLOCK}) > 4.5")
+    during = tab.ask(f"[{CLOCK}, {place}, {cursor}]")
+    assert all(a != b for a, b in zip(before, during, strict=True))
+    tab.until(f"document.querySelector('[data-do=play]').textContent === '▶' && {CLOCK} === '9.70 s'")
+
+
+def test_dragging_over_a_chart_zooms_all_of_them_and_the_path(tab: Tab, log: FlightLog) -> None:
+    path = numbers(tab.ask(PATH))
+    left, top, width, height = tab.box(".plot")
+    tab.drag(left + 0.5 * width, top + height / 2, left + 0.6 * width, top + height / 2)
+    assert shown_s(tab, log) == pytest.approx((0.5 * 9.7, 0.6 * 9.7), abs=0.03)
+    boxes = tab.ask("[...document.querySelectorAll('.plot svg[data-low]')].map((s) => s.getAttribute('viewBox'))")
+    assert len({box.split(" ")[0] for box in boxes}) == 1
+    assert len(numbers(tab.ask(PATH))) == pytest.approx(2 * 97, abs=6)  # a point for each tick in the window
+    assert np.ptp(numbers(tab.ask(PATH))[::2]) < np.ptp(path[::2])
+    times = tab.ask("[...document.querySelectorAll('.times span')].slice(0, 3).map((s) => parseFloat(s.textContent))")
+    assert all(4.8 < value < 5.9 for value in times)
+    tab.click("[data-do=whole]")
+    assert tab.ask(VIEW) == CLEAR
+
+
+def test_wheel_buttons_and_keys_zoom_too(tab: Tab) -> None:
+    x, y, _ = middle(tab, ".plot")
+    tab.mouse("mouseMoved", x, y)
+    tab.mouse("mouseWheel", x, y, deltaX=0, deltaY=-200, modifiers=2)
+    tab.settle()
+    by_wheel = tab.ask(VIEW)[2]
+    assert by_wheel < 1000
+    tab.click("[data-do=in]")
+    assert tab.ask(VIEW)[2] == pytest.approx(0.6 * by_wheel, rel=1e-3)
+    at = tab.ask(VIEW)[0]
+    tab.click("[data-do=later]")
+    assert tab.ask(VIEW)[0] > at
+    tab.ask("document.activeElement.blur()")
+    tab.key("0")
+    assert tab.ask(VIEW) == CLEAR
+
+
+def test_values_fill_the_height_where_asked_for(tab: Tab) -> None:
+    height = "Number(document.querySelectorAll('.plot svg[data-low]')[2].getAttribute('viewBox').split(' ')[3])"
+    tab.click("tr[data-zoom]:nth-child(4)")  # the row of the take-off: x hardly moves
+    assert tab.ask(height) == 1000
+    tab.click("[data-do=fit]")
+    assert 0 < tab.ask(height) < 500
+    labels = tab.ask(
+        "[...document.querySelectorAll('.scale')[2].children].map((s) => Number(s.textContent.replace('\\u2212', '-')))"
+    )
+    assert len(labels) >= 3
+    assert max(np.abs(labels)) <= 0.12  # 10 cm beside the reference
+
+
+def test_one_instant_is_read_out_everywhere(tab: Tab, log: FlightLog) -> None:
+    left, top, width, height = tab.box(".plot")
+    time_s = FINDING_S + 0.1  # what was found stays to be read for a while
+    tab.mouse("mouseMoved", left + width * time_s / 9.7, top + height / 2)
+    tab.settle()
+    assert float(tab.ask(CLOCK).removesuffix(" s")) == pytest.approx(time_s, abs=0.02)
+    told = "[...document.querySelectorAll('.chart output')].map((o) => Number(o.textContent.replace('\\u2212', '-')))"
+    values = tab.ask(told)
+    assert values[0] == pytest.approx(0.1, rel=0.02)
+    roles = tab.ask("[...document.querySelectorAll('.trace')].map((t) => t.dataset.role)")
+    read = [values[roles.index(f"0/{axis}")] for axis in "xyz"]
+    tick = int(np.argmin(np.abs(log.series.time_s - float(tab.ask(CLOCK).removesuffix(" s")))))
+    assert read == pytest.approx(log.series.p_WB[tick].tolist(), abs=0.01)
+    assert "pose gap 42 ms" in tab.ask("document.querySelector('.story').textContent")
+    assert "trajectory" in tab.ask("document.querySelector('.story').textContent")
+
+
+def test_a_finding_leads_to_its_time(tab: Tab) -> None:
+    tab.click("tr[data-begin]:not([data-zoom])")
+    assert float(tab.ask(CLOCK).removesuffix(" s")) == pytest.approx(FINDING_S, abs=0.02)
+
+
+def test_a_phone_shows_all_and_takes_two_fingers(tab: Tab, report: Path) -> None:
+    tab.screen(390, 844, phone=True)
+    tab.open(report, FINE)
+    tab.settle()
+    assert tab.ask("document.documentElement.scrollWidth") == 390
+    cut = """[...document.querySelectorAll('.phases span:not([hidden]) em:not([hidden])')].filter(
+        (name) => name.offsetWidth > name.parentElement.clientWidth).map((name) => name.textContent)"""
+    assert tab.ask(cut) == []
+    tab.picture(PICTURES / "phone.png")
+    left, top, width, height = tab.box(".plot")
+    y = top + height / 2
+    tab.pinch([((left + 0.4 * width, y), (left + 0.2 * width, y)), ((left + 0.6 * width, y), (left + 0.8 * width, y))])
+    begin, _, length, _ = tab.ask(VIEW)
+    assert length == pytest.approx(2000 / 3, rel=0.05)
+    assert begin == pytest.approx(2000 / 3, rel=0.05)
+    before = np.ptp(numbers(tab.ask(PATH))[::2])
+    x, y, _ = middle(tab, ".space")
+    tab.pinch([((x - 30, y), (x - 60, y)), ((x + 30, y), (x + 60, y))])
+    assert np.ptp(numbers(tab.ask(PATH))[::2]) == pytest.approx(2.0 * before, rel=0.1)
+
+
+def test_flights_are_laid_over_each_other(window: Tab, log: FlightLog, tmp_path: Path) -> None:
+    other = log_of(synthetic_flight.flight(synthetic_flight.beside(0.3)), name="the other")
+    page = write_comparison([log, other], tmp_path / "two.html")
+    window.screen(1280, 900)
+    window.open(page, FINE)
+    window.settle()
+    assert window.ask("document.querySelectorAll('.space .path').length") == 2
+    assert window.ask("document.querySelectorAll('.space .now').length") == 2
+    left, top, width, height = window.box(".plot")
+    window.mouse("mouseMoved", left + width / 2, top + height / 2)
+    window.settle()
+    outputs = window.ask(
+        "[...document.querySelectorAll('.chart output')].slice(0, 2).map((o) => Number(o.textContent))"
+    )
+    assert outputs == pytest.approx([0.1, 0.3], rel=0.02)
+    window.picture(PICTURES / "comparison.png")
+    assert window.errors == []
+
+
+def test_a_browser_that_cannot_unpack_still_zooms(tab: Tab, report: Path, tmp_path: Path) -> None:
+    html = report.read_text(encoding="utf-8").replace("DecompressionStream", "NoSuchStream")
+    old = tmp_path / "old.html"
+    old.write_text(html, encoding="utf-8")
+    tab.open(old, "document.body.classList.contains('live')")
+    tab.settle()
+    tab.click("[data-do=in]")
+    assert tab.ask(VIEW)[2] == pytest.approx(1200, rel=1e-3)
+    assert len(numbers(tab.ask(PATH))) > 20

@@ -6,14 +6,15 @@ import contextlib
 import importlib.metadata
 import io
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import IO
 
-from google.protobuf.message import Message
 from mcap.writer import CompressionType, Writer
 
-from lcd_flight.model import Finding, MotorRequest, Phase, RefusedError, Tick, TickInputs
-from lcd_flight.record import scene, topics, viewer
+from lcd_flight.model import MotorRequest, RefusedError, Tick, TickInputs
+from lcd_flight.record import topics
+from lcd_flight.record.display import Display, Shown
 from lcd_flight.record.header import PROFILE, FlightHeader, attachments, metadata
 from lcd_flight.record.topics import TOPICS, Topic
 from lcd_flight.wire import json_records
@@ -23,9 +24,6 @@ CHUNK_BYTES = 64 * 1024
 
 FLUSH_EACH_NS = 500_000_000
 """In the ticks' own time, so that equal ticks make equal chunks."""
-
-_LAST_STAMP_NS = 2**64 - 1
-"""MCAP's stamps are unsigned; a source's clock may be anything."""
 
 
 class LogWriter:
@@ -45,8 +43,7 @@ class LogWriter:
         """
         self._flight = flight
         self._flushed_ns: int | None = None
-        self._phase: Phase | None = None
-        self._findings: frozenset[str] = frozenset()
+        self._display = Display(flight.plan, flight.vehicle, flight.limits)
         self._owned = isinstance(target, Path)
         try:
             self._stream = target.open("xb") if isinstance(target, Path) else target
@@ -70,11 +67,11 @@ class LogWriter:
         now_ns = tick.now_ns
         if self._flushed_ns is None:
             self._flushed_ns = now_ns
-            self._set_scene(tick)
+            # At the first tick, so that a viewer's time line begins there.
+            self._show(self._display.surroundings(now_ns), tick)
         self._add(topics.TICK_INPUTS, json_records.encode(inputs), tick)
         self._add(topics.TICK, json_records.encode(tick), tick)
-        self._draw(inputs, tick)
-        self._tell(inputs, tick)
+        self._show(self._display.tick(inputs, tick), tick)
         if tick.motors in (MotorRequest.DISARM, MotorRequest.STOP):
             self.sync()
         elif now_ns - self._flushed_ns >= FLUSH_EACH_NS:
@@ -122,41 +119,9 @@ class LogWriter:
         about = {"rate": topic.rate, "units": topic.units}
         return self._mcap.register_channel(topic.name, topic.encoding, schema_id, about)
 
-    def _set_scene(self, tick: Tick) -> None:
-        """What stands still; at the first tick, so that a viewer's time line begins there."""
-        flight = self._flight
-        self._add_message(topics.PLAN, viewer.path_poses(tick.now_ns, flight.plan.joined()), tick)
-        around = scene.flight_scene(tick.now_ns, flight.plan, flight.vehicle, flight.limits.geofence)
-        self._add_message(topics.SCENE, around, tick)
-
-    def _draw(self, inputs: TickInputs, tick: Tick) -> None:
-        """What moves."""
-        now_ns, state, raw = tick.now_ns, inputs.pose.state, inputs.pose.raw
-        if state is not None:
-            stamp_ns = now_ns if raw is None else min(max(raw.source_stamp_ns, 0), _LAST_STAMP_NS)
-            self._add_message(topics.TRANSFORMS, viewer.transforms(now_ns, state), tick)
-            self._add_message(topics.POSE, viewer.vehicle_pose(now_ns, state), tick, stamp_ns)
-        if tick.reference is not None:
-            self._add_message(topics.REFERENCE, viewer.reference_pose(now_ns, tick.reference), tick)
-
-    def _tell(self, inputs: TickInputs, tick: Tick) -> None:
-        """What is new in words: the phase, findings as they begin, and what the vehicle says."""
-        if tick.phase is not self._phase:
-            self._phase = tick.phase
-            self._add_message(topics.LOG, viewer.text_line(tick.now_ns, "phase", tick.phase.value), tick)
-        for finding in self._begun(tick.findings):
-            self._add_message(topics.LOG, viewer.finding_line(tick.now_ns, finding), tick)
-        telemetry = inputs.link.telemetry
-        for text in telemetry.messages if telemetry is not None else ():
-            self._add_message(topics.LOG, viewer.text_line(tick.now_ns, "vehicle", text), tick)
-
-    def _begun(self, findings: tuple[Finding, ...]) -> list[Finding]:
-        """Those that the tick before did not have."""
-        before, self._findings = self._findings, frozenset(finding.code for finding in findings)
-        return [finding for finding in findings if finding.code not in before]
-
-    def _add_message(self, topic: Topic, message: Message, tick: Tick, publish_ns: int | None = None) -> None:
-        self._add(topic, message.SerializeToString(), tick, publish_ns)
+    def _show(self, messages: Iterable[Shown], tick: Tick) -> None:
+        for topic, message, publish_ns in messages:
+            self._add(topic, message.SerializeToString(), tick, publish_ns)
 
     def _add(self, topic: Topic, data: bytes, tick: Tick, publish_ns: int | None = None) -> None:
         self._mcap.add_message(

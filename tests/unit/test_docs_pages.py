@@ -17,7 +17,11 @@ from lcd_flight.flight.manoeuvres import BLIND_MARGIN
 from lcd_flight.flight.operator import INTERRUPTS, KEYS
 from lcd_flight.flight.phases import LANDING_GRACE_S, TIME_LIMITS_S, as_table
 from lcd_flight.learning.collect import Mix
+from lcd_flight.learning.dataset_card import column_table
+from lcd_flight.learning.mix import SOURCES
 from lcd_flight.learning.recipes import RECIPES
+from lcd_flight.learning.rollouts import Source
+from lcd_flight.learning.schema import SCHEMA_VERSION
 from lcd_flight.model import Command, Outcome, State
 from lcd_flight.model.frames import IDENTITY
 from lcd_flight.planning.cost.features import FEATURE_NAMES
@@ -142,9 +146,14 @@ def test_recipes_and_mix() -> None:
         wanted = (config.count, config.rounds, config.policy_tasks, config.members, config.capacity)
         assert tuple(int(figure.replace(",", "")) for figure in figures) == wanted
     rows = {source: count for source, _, count in table("method.md", "source")}
-    searched = mix.search_tasks * mix.search_population * mix.search_generations
-    assert rows["searches"] == f"{searched:,}"
-    assert rows["random"] == f"{mix.random_tasks * mix.random_draws:,}"
-    assert rows["optima"] == f"{mix.random_tasks:,}"
+    for name, source in (("searches", Source.SEARCH), ("random", Source.RANDOM), ("optima", Source.OPTIMUM)):
+        assert rows[name] == f"{mix.tasks_in_a_shard(source) * mix.rows_of_a_task(source):,}"
     assert f"a shard of {mix.rows:,}" in page("method.md")
-    assert searched / mix.rows == pytest.approx(7 / 8, abs=0.01)
+    assert mix.search == pytest.approx(7 / 8, abs=0.01)
+
+
+def test_columns_and_sources_of_data() -> None:
+    assert column_table() in page("data.md")
+    assert f"Schema version {SCHEMA_VERSION}." in page("data.md")
+    shares = {row[0]: float(row[-1]) for row in table("data.md", "name")}
+    assert shares == {name: getattr(Mix(), name) for name in SOURCES}

@@ -12,7 +12,7 @@ from typing import IO
 
 from mcap.writer import CompressionType, Writer
 
-from lcd_flight.model import MotorRequest, RefusedError, Tick, TickInputs
+from lcd_flight.model import MotorRequest, Phase, RefusedError, Tick, TickInputs
 from lcd_flight.record import topics
 from lcd_flight.record.display import Display, Shown
 from lcd_flight.record.header import PROFILE, FlightHeader, attachments, metadata
@@ -24,6 +24,9 @@ CHUNK_BYTES = 64 * 1024
 
 FLUSH_EACH_NS = 500_000_000
 """In the ticks' own time, so that equal ticks make equal chunks."""
+
+_GIVEN_UP = frozenset({Phase.LAND_NOW, Phase.DESCEND_BLIND, Phase.KILL, Phase.CRASHED})
+_AT_THE_END = frozenset({MotorRequest.DISARM, MotorRequest.STOP})
 
 
 class LogWriter:
@@ -44,6 +47,7 @@ class LogWriter:
         self._flight = flight
         self._flushed_ns: int | None = None
         self._display = Display(flight.plan, flight.vehicle, flight.limits)
+        self._turn = (False, False)
         self._owned = isinstance(target, Path)
         try:
             self._stream = target.open("xb") if isinstance(target, Path) else target
@@ -72,11 +76,16 @@ class LogWriter:
         self._add(topics.TICK_INPUTS, json_records.encode(inputs), tick)
         self._add(topics.TICK, json_records.encode(tick), tick)
         self._show(self._display.tick(inputs, tick), tick)
-        if tick.motors in (MotorRequest.DISARM, MotorRequest.STOP):
+        if self._turns(tick):
             self.sync()
         elif now_ns - self._flushed_ns >= FLUSH_EACH_NS:
             self._mcap.flush()  # type: ignore[no-untyped-call]
             self._flushed_ns = now_ns
+
+    def _turns(self, tick: Tick) -> bool:
+        """Whether this tick ends the flight or gives it up: what led to it must outlast what comes next."""
+        before, self._turn = self._turn, (tick.phase in _GIVEN_UP, tick.motors in _AT_THE_END)
+        return any(now and not earlier for now, earlier in zip(self._turn, before, strict=True))
 
     def sync(self) -> None:
         """Flush, and wait until the disk itself has everything; a stream that is no file is flushed only.

@@ -24,7 +24,7 @@ from mcap.reader import make_reader
 from mcap.records import Message
 from synthetic_flight import Pair
 
-from lcd_flight.model import Finding, InputError, PoseReport, RefusedError, Severity
+from lcd_flight.model import Finding, InputError, MotorRequest, Phase, PoseReport, RefusedError, Severity
 from lcd_flight.record import FlightHeader, LogWriter, read_log, read_ticks
 from lcd_flight.record.topics import TOPICS
 
@@ -238,6 +238,21 @@ def test_disarming_reaches_the_disk_at_once(tmp_path: Path, pairs: list[Pair], m
             writer.write(inputs, tick)
         assert len(synced) == 2
         assert len(read_ticks(path)) == 2
+
+
+@pytest.mark.parametrize("phase", [Phase.LAND_NOW, Phase.DESCEND_BLIND, Phase.KILL, Phase.CRASHED])
+def test_giving_up_reaches_the_disk_once(
+    tmp_path: Path, pairs: list[Pair], monkeypatch: pytest.MonkeyPatch, phase: Phase
+) -> None:
+    """A stop is asked for at every tick; the disk is waited for at the first."""
+    stop = MotorRequest.STOP if phase in (Phase.KILL, Phase.CRASHED) else MotorRequest.NONE
+    ending = [(i, replace(t, phase=phase, motors=stop)) for i, t in pairs[300:310]]
+    synced: list[int] = []
+    with closing(LogWriter(tmp_path / "given_up.mcap", synthetic_flight.header())) as writer:
+        monkeypatch.setattr(os, "fsync", synced.append)
+        for inputs, tick in (*pairs[290:300], *ending):
+            writer.write(inputs, tick)
+        assert len(synced) == 1
 
 
 def test_a_log_is_never_overwritten(log: Path) -> None:

@@ -29,7 +29,7 @@ UNLOCK_S = 0.1
 """Zero setpoints for so long before the control loop's: a lost one would leave the thrust locked."""
 STOPS_S = 0.1
 """For so long `stop` is repeated before the vehicle is left alone."""
-DESCENT_S = 10.0
+DESCENT_S = 15.0
 """So long is given to a vehicle that is still in the air when the link closes."""
 GROUND_M = 0.05
 """Above where it stood: lower is on the ground."""

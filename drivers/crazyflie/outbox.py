@@ -3,7 +3,7 @@
 - Before arming, nothing; from arming to the first setpoint, the zero setpoint that unlocks.
 - A setpoint goes out once, while it is at most 50 ms old; the freshest wins; what has aged is never sent.
 - From 100 ms without a fresh one, the fallback, level and slightly below hover thrust, at the control rate: the vehicle
-  itself would level out after 500 ms and keep its last thrust. A fresh setpoint ends it; after 10 s the motors stop.
+  itself would level out after 500 ms and keep its last thrust. A fresh setpoint ends it; after 15 s the motors stop.
 - Setpoints are of one type (a change of type resets the onboard controller); the end is `stop`, repeated, then
   `notify stop`, since silence after `stop` locks the vehicle.
 - The emergency stop's watchdog is fed only while the control loop shows that it is alive.
@@ -23,7 +23,7 @@ PERIOD_NS = 10 * MS
 """Of everything that is repeated: the control rate."""
 MAX_AGE_NS = 50 * MS
 FALLBACK_NS = 100 * MS
-FALLBACK_LIMIT_NS = 10_000 * MS
+FALLBACK_LIMIT_NS = 15_000 * MS
 FEED_PERIOD_NS = 100 * MS
 """The vehicle wants its emergency watchdog fed every 1,000 ms."""
 NOTIFICATIONS = 3

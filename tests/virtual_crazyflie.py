@@ -12,7 +12,7 @@ from sim_bridge.crazyflie.variants import variant
 from sim_bridge.crazyflie.vehicle import SimulatedCrazyflie
 
 HOVER = 38_842
-"""Counts that carry a Crazyflie 2.1 with 2.1+ propellers by crazyflie-firmware's figures; this model's are 0.1 % off."""
+"""Counts that carry a Crazyflie 2.1 with 2.1+ propellers, by crazyflie-firmware's figures."""
 CAN_ARM, ARMED, AUTO_ARM, CAN_FLY, FLYING, TUMBLED, LOCKED, CRASHED = (1 << bit for bit in range(8))
 MS = 1_000_000
 

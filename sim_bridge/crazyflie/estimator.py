@@ -3,6 +3,9 @@
 A Kalman filter of the form of crazyflie-firmware's (src/modules/src/kalman_core.c: the same states, initial and process
 variances and bounds), with axes apart: position and velocity of an axis share a 2 x 2 covariance, each axis of the
 attitude has a variance. What is left out: drag, and that a position corrects the attitude. Without pose it drifts.
+
+Where poses are not used, the attitude alone is estimated, as by the complementary filter (sensfusion6_impl.c, after
+Mahony): the accelerometer pulls it level.
 """
 
 from __future__ import annotations
@@ -22,6 +25,8 @@ PROCESS_ACCELERATION = (0.5, 0.5, 1.0)
 """m/s^2, standard deviation of what acceleration is not known."""
 GYRO_NOISE = (0.1, 0.1, 0.1)
 """rad/s, likewise of the body rates."""
+LEVELLING = 0.4
+"""rad/s for each rad between the estimated up and the accelerometer's (TWO_KP_DEF / 2)."""
 LARGEST_VARIANCE, SMALLEST_VARIANCE = 1e4, 1e-6
 SIGMAS = (1e-6, 1e6)
 """Least and greatest standard deviation that a pose is believed to have, whatever the parameters say."""
@@ -106,18 +111,28 @@ class Estimator:
         """Whether it has left what it can hold."""
         return not all(abs(axis.position) <= FARTHEST_M and abs(axis.velocity) <= FASTEST for axis in self.axes)
 
-    def predict(self, measured: Inertial, *, position: bool) -> None:
-        """One period of the inertial sensors."""
-        self.body_rates = measured.body_rates
-        p, q, r = (0.5 * PERIOD_S * rate for rate in measured.body_rates)
-        self.attitude = normalized(multiply(self.attitude, (p, q, r, 1.0)))
+    def predict(self, measured: Inertial) -> None:
+        """One period of the inertial sensors, in the filter that takes poses."""
+        self._turn(measured, (0.0, 0.0, 0.0))
         for n, sigma in enumerate(GYRO_NOISE):
             self.attitude_variance[n] = _bounded(self.attitude_variance[n] + (sigma * PERIOD_S) ** 2)
+        for axis, acceleration in zip(self.axes, self.acceleration, strict=True):
+            axis.predict(acceleration)
+
+    def level(self, measured: Inertial) -> None:
+        """One period in the filter that takes none: turn towards where the accelerometer sees up."""
+        ux, uy, uz = rotate(conjugate(self.attitude), (0.0, 0.0, 1.0))
+        ax, ay, az = measured.specific_force
+        gain = LEVELLING / max(math.hypot(ax, ay, az), 1e-3)
+        self._turn(measured, (gain * (ay * uz - az * uy), gain * (az * ux - ax * uz), gain * (ax * uy - ay * ux)))
+
+    def _turn(self, measured: Inertial, extra: Vector3) -> None:
+        """Integrate the gyroscope, and what is to be added to it; rad/s."""
+        self.body_rates = measured.body_rates
+        p, q, r = (0.5 * PERIOD_S * (rate + more) for rate, more in zip(measured.body_rates, extra, strict=True))
+        self.attitude = normalized(multiply(self.attitude, (p, q, r, 1.0)))
         x, y, z = rotate(self.attitude, measured.specific_force)
         self.acceleration = (x, y, z - GRAVITY_M_PER_S2)
-        if position:
-            for axis, acceleration in zip(self.axes, self.acceleration, strict=True):
-                axis.predict(acceleration)
 
     def see_position(self, p_WB: Vector3, sigma_m: float) -> None:
         """A position from outside."""

@@ -145,7 +145,10 @@ class Firmware:
         elif self._uses_poses != self._used_poses:
             self.estimator = self._fresh_estimator()
         self._used_poses = self._uses_poses
-        self.estimator.predict(self._body.inertial, position=self._uses_poses)
+        if not self._uses_poses:
+            self.estimator.level(self._body.inertial)
+            return
+        self.estimator.predict(self._body.inertial)
         if self.estimator.lost:
             self.estimator = self._fresh_estimator()
             self._unsent.extend(_text("ESTKALMAN: State out of bounds, resetting\n"))

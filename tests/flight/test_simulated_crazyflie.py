@@ -364,8 +364,7 @@ class TestTumbling:
         assert client.supervision is State.CRASHED
         assert client.ask("9D 02") == [bytes.fromhex("9D 82 00 00")]
         client.vehicle.body.put_upright()
-        client.ask(rpyt(0))  # the last setpoint holds for ever, and would be flown
-        client.wait(200.0)
+        client.fly(2200.0, 0)  # until it no longer counts as flying; the last setpoint would be flown again
         assert client.info & (TUMBLED | CRASHED) == CRASHED
         assert client.ask("9D 02") == [bytes.fromhex("9D 82 01 01")]
         client.wait(200.0)

@@ -11,7 +11,21 @@ from pathlib import Path
 import typer
 from typer.exceptions import TyperException
 
-from lcd_flight.cli import bench, collect, evaluation, export, fly, learning, mission, plan, recover, replay, review, sim
+from lcd_flight.cli import (
+    bench,
+    collect,
+    evaluation,
+    export,
+    fly,
+    learning,
+    mission,
+    plan,
+    recover,
+    replay,
+    reproduction,
+    review,
+    sim,
+)
 from lcd_flight.cli.terminal import Terminal
 from lcd_flight.errors import LcdError, Outcome
 
@@ -31,6 +45,7 @@ app.command("plan")(plan.plan)
 app.command("collect")(collect.collect)
 app.command("train")(learning.train)
 app.command("evaluate")(evaluation.evaluate)
+app.command("reproduce")(reproduction.reproduce)
 app.command("review")(review.review)
 app.command("replay")(replay.replay)
 app.command("recover")(recover.recover)

@@ -171,10 +171,13 @@ class Evaluation:
 
     @staticmethod
     def beside(parts: Sequence[Evaluation]) -> Evaluation:
-        """Evaluations of the same tasks and methods in one drag configuration each, by models of their own, as one."""
+        """Evaluations of the same tasks and methods in one drag configuration each, by models of their own, as one.
+
+        Its options name the first model.
+        """
         first, drags = parts[0], tuple(drag for p in parts for drag in p.options.drags)
         runs = {name: MethodRun.beside([p.runs[name] for p in parts]) for name in first.runs}
-        return replace(first, options=replace(first.options, drags=drags, model=None), runs=runs)
+        return replace(first, options=replace(first.options, drags=drags), runs=runs)
 
     def as_json(self) -> dict[str, Any]:
         """What `lcd evaluate --json` prints."""

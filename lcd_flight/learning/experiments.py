@@ -17,10 +17,14 @@ WORLDS = ("crazyflie-paper", "crazyflie-saturated", "hummingbird-paper")
 """The paper's setting as written, the same where minimum snap crashes as often as reported, the released code's."""
 DRAGS = (1, 2, 3, 4, 5)
 MIDDLE_DRAG = 3
+COUNT, QUICK_COUNT = 1000, 4
+"""Tasks of each world, unless said otherwise."""
+_NOISE_SEEDS = 3
 TIMINGS: tuple[Timing, ...] = ("fixed", "retimed")
 
 Models: TypeAlias = Literal["train", "shipped"]
-Group: TypeAlias = Literal["paper", "beyond", "shipped"]
+Group: TypeAlias = Literal["paper", "probe", "beyond", "shipped"]
+"""`probe`: minimum snap in changed worlds, for what decides its crash rate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,9 +33,9 @@ class ReproduceSettings:
 
     seed: int
     """Of tasks and noise."""
-    count: int = 1000
+    count: int = COUNT
     """Tasks of each world."""
-    noise_seeds: int = 3
+    noise_seeds: int = _NOISE_SEEDS
     recipe: str = "medium"
     """How the models are trained, by name (`recipes.py`)."""
     per_drag: bool = False
@@ -45,6 +49,19 @@ class ReproduceSettings:
     def drags(self) -> tuple[int, ...]:
         """Configurations that the paper's experiment is flown in."""
         return (MIDDLE_DRAG,) if self.quick else DRAGS
+
+    @property
+    def command(self) -> str:
+        """The command line that makes the same again."""
+        words = {
+            f"--count {self.count}": self.count != (QUICK_COUNT if self.quick else COUNT),
+            f"--noise-seeds {self.noise_seeds}": self.noise_seeds != _NOISE_SEEDS,
+            f"--recipe {self.recipe}": self.models == "train",
+            "--models shipped": self.models == "shipped",
+            "--per-drag": self.per_drag,
+            "--quick": self.quick,
+        }
+        return " ".join(["lcd reproduce", *(word for word, said in words.items() if said)])
 
     def __post_init__(self) -> None:
         """Check before hours are spent.
@@ -78,7 +95,7 @@ class Experiment:
 
 def experiments(settings: ReproduceSettings) -> list[Experiment]:
     """All of them, the paper's first."""
-    return [*_paper(settings), *_beyond(settings), *_shipped(settings)]
+    return [*_paper(settings), *_probes(settings), *_beyond(settings), *_shipped(settings)]
 
 
 def trainings(settings: ReproduceSettings) -> list[TrainConfig]:
@@ -123,6 +140,28 @@ def _paper(settings: ReproduceSettings) -> list[Experiment]:
         )
         for world in _worlds()
         for timing in TIMINGS
+    ]
+
+
+def _probes(settings: ReproduceSettings) -> list[Experiment]:
+    """Minimum snap in worlds that differ in one thing each: why crash rates disagree."""
+    paper, saturated, hummingbird = _worlds()
+    slow_motors = replace(paper.base_vehicle, motor_time_constant_s=0.072)
+    quiet = replace(paper.base_vehicle, motor_noise=0.0)
+    boundless = replace(saturated.base_vehicle, rotor_speed_max=4.0 * saturated.base_vehicle.rotor_speed_max)
+    changed = {
+        "motors of 72 ms in place of 5 ms": replace(paper, base_vehicle=slow_motors),
+        "no motor noise": replace(paper, base_vehicle=quiet),
+        "2.25 m/s": replace(paper, speed=2.25),
+        "2.5 m/s": replace(paper, speed=2.5),
+        "no upper motor limit": replace(saturated, base_vehicle=boundless),
+        "all yaws zero": replace(hummingbird, sampler=replace(hummingbird.sampler, yaw_span_rad=0.0)),
+        "start at yaw zero": replace(hummingbird, start_aligned=False),
+    }
+    options = EvaluationOptions(settings.seed, "fixed", (MIDDLE_DRAG,), settings.noise_seeds)
+    return [
+        Experiment(f"probe-{number}", title, "probe", world, ("minimum-snap",), options, trained=False)
+        for number, (title, world) in enumerate(changed.items(), start=1)
     ]
 
 

@@ -16,7 +16,15 @@ from typing import TypeAlias
 from lcd_flight.learning.evaluate import evaluate, tasks_of
 from lcd_flight.learning.evaluation import Evaluation, EvaluationOptions
 from lcd_flight.learning.evaluation_files import Parts
-from lcd_flight.learning.experiments import DRAGS, Experiment, ReproduceSettings, experiments, model_name, trainings
+from lcd_flight.learning.experiments import (
+    DRAGS,
+    Experiment,
+    Group,
+    ReproduceSettings,
+    experiments,
+    model_name,
+    trainings,
+)
 from lcd_flight.learning.progress import Progress, ProgressCallback
 from lcd_flight.learning.recipes import TrainConfig
 from lcd_flight.learning.train import train
@@ -59,6 +67,10 @@ class Reproduction:
     """By the experiment's name."""
     seconds: float
     """Of this run; less than all where it went on from an earlier one."""
+
+    def in_group(self, group: Group) -> list[Experiment]:
+        """The experiments of one group, in order."""
+        return [experiment for experiment in self.experiments if experiment.group == group]
 
 
 def reproduce(settings: ReproduceSettings, work: Path, simulator: Simulator, progress: StageCallback) -> Reproduction:

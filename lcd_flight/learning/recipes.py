@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from lcd_flight.learning.collect_config import CollectConfig
 from lcd_flight.learning.fit import FitSettings
 from lcd_flight.learning.mix import Mix
-from lcd_flight.learning.policy import DRAWS
+from lcd_flight.learning.policy import PolicyMix
 from lcd_flight.learning.targets import TargetName
 from lcd_flight.model import InputError, World
 from lcd_flight.planning.cost.inputs import InputsName
@@ -27,8 +27,9 @@ class TrainConfig:
     rounds: int = 2
     """On-policy rounds after the first model."""
     policy_tasks: int = 6_000
-    """Planned in each round, of all worlds together; each gives 16 rollouts."""
+    """Planned in each round, of all worlds together, up to whole blocks of `policy`."""
     members: int = 1
+    """Of the last model; those before it only propose plans, and have one."""
     snap_weight: float = 0.1
     drags: tuple[int, ...] = (1, 2, 3, 4, 5)
     inputs: InputsName = "windows"
@@ -36,6 +37,7 @@ class TrainConfig:
     target: TargetName = "error"
     """What they predict; `released` is for networks that see whole trajectories."""
     mix: Mix = field(default_factory=Mix)
+    policy: PolicyMix = field(default_factory=PolicyMix)
     fit: FitSettings = field(default_factory=FitSettings)
 
     def __post_init__(self) -> None:
@@ -66,29 +68,29 @@ class TrainConfig:
         return -(-self.count // len(self.worlds))
 
     @property
-    def policy_tasks_of_each(self) -> int:
-        """Tasks of each world in each round."""
-        return -(-self.policy_tasks // len(self.worlds))
+    def policy_blocks_of_each(self) -> int:
+        """Blocks of tasks of each world in each round."""
+        return -(-self.policy_tasks // (len(self.worlds) * self.policy.block))
 
     @property
     def capacity(self) -> int:
         """Rollouts in all."""
-        return len(self.worlds) * (self.count_of_each + self.rounds * self.policy_tasks_of_each * DRAWS)
+        return len(self.worlds) * (self.count_of_each + self.rounds * self.policy_blocks_of_each * self.policy.rows)
 
 
 def small_recipe(name: str, worlds: tuple[World, ...], seed: int = 0) -> TrainConfig:
-    """About a million labels and one network: a minute or two on two cores."""
-    return TrainConfig(name, worlds, seed)
+    """About a million labels and one network: a few minutes on two cores."""
+    return TrainConfig(name, worlds, seed, count=600_000, rounds=2, policy_tasks=12_800)
 
 
 def medium_recipe(name: str, worlds: tuple[World, ...], seed: int = 0) -> TrainConfig:
-    """About two million labels and two networks; what `crazyflie-flight` was made by, from three speeds."""
-    return TrainConfig(name, worlds, seed, count=1_500_000, rounds=2, policy_tasks=12_000, members=2)
+    """About two million labels and two networks."""
+    return TrainConfig(name, worlds, seed, count=1_000_000, rounds=2, policy_tasks=32_000, members=2)
 
 
 def full_recipe(name: str, worlds: tuple[World, ...], seed: int = 0) -> TrainConfig:
-    """About four million labels and two networks; what `crazyflie-paper` was made by."""
-    return TrainConfig(name, worlds, seed, count=2_600_000, rounds=3, policy_tasks=25_500, members=2)
+    """About four million labels and two networks; what the models that ship were made by."""
+    return TrainConfig(name, worlds, seed, count=1_600_000, rounds=3, policy_tasks=51_200, members=2)
 
 
 RECIPES = {"small": small_recipe, "medium": medium_recipe, "full": full_recipe}

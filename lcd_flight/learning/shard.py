@@ -11,13 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from lcd_flight.learning.collect_config import CollectConfig
-from lcd_flight.learning.flying import DragByRow, fly, options_of
+from lcd_flight.learning.flying import fly
 from lcd_flight.learning.given import GivenPlans, jittered
 from lcd_flight.learning.mix import SOURCES, Order
 from lcd_flight.learning.rollouts import Plans, Rollouts, Source
-from lcd_flight.learning.sources import optima, random_plans, retimed_plans, training_tasks, whitening
-from lcd_flight.model import BoolArray, InputError, IntArray, Simulator
-from lcd_flight.planning.search import Arena, Generation, SearchSettings, search
+from lcd_flight.learning.searching import searched
+from lcd_flight.learning.sources import optima, random_plans, retimed_plans
+from lcd_flight.model import InputError, IntArray, Simulator
+from lcd_flight.planning.search import SearchSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,37 +88,8 @@ class ShardMaker:
         return jittered(self.given.visit(visit), row, draw == 0, self.config.seed)
 
     def _searched(self, task: IntArray) -> Rollouts:
-        """Every sample of a search from minimum snap for each task (N,): task by task, generation by generation."""
+        """Every sample of a search from minimum snap for each task (N,)."""
         config, mix = self.config, self.config.mix
-        short, drag = config.short_yaw(task), config.drag(task)
-        space = whitening(training_tasks(config.world.sampler, config.seed, task, short), config.world.speed)
-        simulator = DragByRow(self.simulator, config.world.drag_configurations, np.repeat(drag, mix.population))
-        found: list[Rollouts] = []
-        search(
-            space,
-            np.zeros(space.z_shape),
-            np.zeros(space.durations_s.shape),
-            Arena(simulator, config.world.base_vehicle, options_of(config.world, self.threads)),
-            seed=config.seed,
-            tasks=task,
-            settings=SearchSettings(mix.population, mix.generations),
-            watch=lambda generation: found.append(_rows_of(generation, task, short, drag)),
-        )
-        generation_task_sample = np.arange(mix.generations * len(task) * mix.population)
-        by_task = generation_task_sample.reshape(mix.generations, len(task), mix.population).swapaxes(0, 1).reshape(-1)
-        return Rollouts.concatenate(found).take(by_task)
-
-
-def _rows_of(generation: Generation, task: IntArray, short: BoolArray, drag: IntArray) -> Rollouts:
-    """The rows of one generation, task by task."""
-    tasks, population = generation.costs.shape
-    count = tasks * population
-    plans = Plans(
-        np.repeat(task, population),
-        np.repeat(short, population),
-        np.full(count, Source.SEARCH),
-        generation.z.reshape(count, -1).astype(np.float32),
-        generation.theta.reshape(count, -1).astype(np.float32),
-    )
-    noise_seed = np.repeat(generation.noise_seed, population)
-    return Rollouts(plans, np.repeat(drag, population), noise_seed, generation.labels)
+        start = optima(task, config.short_yaw(task), config.segments)
+        settings = SearchSettings(mix.population, mix.generations)
+        return searched(config, start, settings, self.simulator, kept=mix.population, threads=self.threads)

@@ -20,7 +20,7 @@ from lcd_flight.learning.extras import require_pyarrow, require_torch
 from lcd_flight.learning.fingerprint import described, fingerprint, versions
 from lcd_flight.learning.fit import Fitted, fit
 from lcd_flight.learning.mix import shard_rows
-from lcd_flight.learning.policy import DRAWS, PolicyConfig, collect_policy, sha256_of
+from lcd_flight.learning.policy import PolicyConfig, collect_policy, sha256_of
 from lcd_flight.learning.progress import Meter, ProgressCallback, ignore
 from lcd_flight.learning.rebuild import trajectories
 from lcd_flight.learning.recipes import TrainConfig
@@ -83,12 +83,12 @@ class _Training:
     def next_model(self, number: int) -> CostModel:
         """Fly what the last model plans, and train anew on everything so far."""
         config, last = self._config, self.model_path(number - 1)
-        tasks = config.policy_tasks_of_each
+        blocks = config.policy_blocks_of_each
         for world in config.worlds:
-            policy = PolicyConfig(config.collecting(world), number, sha256_of(last), config.snap_weight)
+            policy = PolicyConfig(config.collecting(world), number, sha256_of(last), config.snap_weight, config.policy)
             folder = self._work / f"round-{number}" / world.name
-            flown = collect_policy(policy, last, tasks, folder, self._simulator, self._progress)
-            self._waiting.append((world, flown, tasks * DRAWS))
+            flown = collect_policy(policy, last, blocks, folder, self._simulator, self._progress)
+            self._waiting.append((world, flown, blocks * config.policy.rows))
         return self._model(number)
 
     def _model(self, number: int) -> CostModel:
@@ -100,7 +100,8 @@ class _Training:
                 raise InputError(f"{path}: made by another configuration; give another work folder")
             return model
         data = self._loaded()
-        members, seed = self._config.members, 1000 * self._config.seed + number
+        members = self._config.members if number == self._config.rounds else 1
+        seed = 1000 * self._config.seed + number
         learned = self._config.fit.epochs * members * len(data.rows(training=True))
         meter = Meter(self._progress, learned, "rollouts learned", 0)
         fitted = fit(data, self._config.fit, members, seed, lambda n: meter.advance(n, f"round {number}"))

@@ -11,7 +11,8 @@ from lcd_flight.learning import train as train_module
 from lcd_flight.learning.collect import Mix
 from lcd_flight.learning.evaluate import EvaluationOptions, evaluate
 from lcd_flight.learning.fit import FitSettings, windows_of
-from lcd_flight.learning.policy import PolicyConfig, collect_policy, policy_plans
+from lcd_flight.learning.policy import PolicyConfig, PolicyMix, collect_policy, policy_rollouts
+from lcd_flight.learning.rebuild import trajectories
 from lcd_flight.learning.recipes import RECIPES, TrainConfig
 from lcd_flight.learning.rollouts import Source
 from lcd_flight.learning.train import train
@@ -19,6 +20,7 @@ from lcd_flight.learning.training_set import trains
 from lcd_flight.model import InputError
 from lcd_flight.planning.cost.inputs import INPUTS
 from lcd_flight.planning.cost.model_file import check_fits, load_model
+from lcd_flight.planning.search import SearchSettings
 from lcd_flight.plugins import simulator
 from lcd_flight.worlds import fingerprint, load_world
 
@@ -29,6 +31,7 @@ TINY = TrainConfig(
     count=12_000,
     rounds=1,
     policy_tasks=40,
+    policy=PolicyMix(block=8, hardest=1, search=SearchSettings(population=8, generations=4)),
     members=2,
     mix=Mix(search=0.4, random=0.45, optimum=0.15, population=8, generations=4, shard_rows=4_000),
     fit=FitSettings(hidden=(32, 16), epochs=12, batch=256),
@@ -78,7 +81,7 @@ def test_the_card_says_what_it_is_good_for(trained):
     card = model.card
     assert card.name == "tiny"
     assert card.worlds == ("crazyflie-saturated v2",)
-    assert card.rollouts == 12_000 + 40 * 16
+    assert card.rollouts == 12_000 + 5 * (8 * 6 + 4 * 4)
     assert card.parasitic_drag == WORLD.drag_configurations
     assert {"torch", "lcd-flight"} <= set(card.versions)
     assert model.network.members == 2
@@ -121,24 +124,51 @@ def test_a_work_folder_of_another_training_is_refused(trained, sim):
         train(replace(TINY, seed=9), folder / "work", folder / "no.safetensors", sim)
 
 
-def test_policy_rows_are_the_plan_and_jitter_around_it(trained, sim, tmp_path):
+@pytest.fixture(scope="module")
+def policy(trained, sim):
     path = trained[0] / "work" / "round-0.safetensors"
-    config = PolicyConfig(TINY.collecting(WORLD), 1, "a hash", 0.1)
-    task = config.tasks(0, 6)
-    plans = policy_plans(config, load_model(path), task)
-    z, theta = plans.z.reshape(6, 16, -1), plans.theta.reshape(6, 16, -1)
+    config = PolicyConfig(TINY.collecting(WORLD), 1, "a hash", 0.1, TINY.policy)
+    return config, path, policy_rollouts(config, load_model(path), config.tasks(0, 16), sim)
+
+
+def test_policy_rows_are_the_plan_and_jitter_around_it(policy):
+    config, _, rollouts = policy
+    plans = rollouts.plans.take(np.arange(96))
+    z, theta = plans.z.reshape(16, 6, -1), plans.theta.reshape(16, 6, -1)
     assert set(plans.source) == {Source.GIVEN}
-    assert np.array_equal(plans.task, np.repeat(task, 16))
+    assert np.array_equal(plans.task, np.repeat(config.tasks(0, 16), 6))
     assert np.abs(z[:, 0]).max() > 0.05
     assert np.all(np.linalg.norm(z[:, 1:] - z[:, :1], axis=2) > 0.0)
-    fixed = ~theta.reshape(6, -1).any(axis=1)
-    assert 0 < fixed.sum() < 6
+    fixed = ~theta.reshape(16, -1).any(axis=1)
+    assert 0 < fixed.sum() < 16
     assert np.all(np.abs(theta[~fixed][:, 1:] - theta[~fixed][:, :1]).max(axis=2) > 0.0)
-    for n in range(6):
-        assert np.allclose(policy_plans(config, load_model(path), task[n : n + 1]).z, z[n], atol=1e-5)
-    made = collect_policy(config, path, 6, tmp_path, sim)
-    assert len(made.read(0)) == 96
-    assert task.min() > 1 << 32
+    assert plans.task.min() > 1 << 32
+
+
+def test_the_hardest_of_each_block_are_searched_from_their_plans(policy):
+    _, path, rollouts = policy
+    searched = rollouts.plans.take(np.arange(96, len(rollouts)))
+    assert set(searched.source) == {Source.SEARCH}
+    hardest = set(searched.task.tolist())
+    assert len(hardest) == 2
+    assert len(searched) == 2 * 4 * 4
+    planned = rollouts.plans.take(np.arange(0, 96, 6))
+    flown = trajectories(WORLD, TINY.seed, planned)
+    expected = load_model(path).predict_max_error_m(flown.durations_s, flown.coefficients).reshape(2, 8)
+    assert {int(planned.task[8 * n + e.argmax()]) for n, e in enumerate(expected)} == hardest
+    for task in hardest:
+        start, rows = planned.z[planned.task == task][0], searched.z[searched.task == task]
+        assert np.array_equal(rows[0], start)
+        still = not planned.theta[planned.task == task].any()
+        assert still == (not searched.theta[searched.task == task].any())
+
+
+def test_a_block_does_not_depend_on_those_beside_it(policy, sim, tmp_path):
+    config, path, rollouts = policy
+    alone = policy_rollouts(config, load_model(path), config.tasks(8, 8), sim)
+    assert np.allclose(alone.plans.z[:48], rollouts.plans.z[48:96], atol=1e-5)
+    made = collect_policy(config, path, 2, tmp_path, sim)
+    assert np.array_equal(made.read(0).plans.z, rollouts.plans.z)
 
 
 def test_the_split_is_by_task():

@@ -87,6 +87,7 @@ def main() -> None:
     chances = ours.mean(axis=1)
     expected = float(chances.sum()) * options.seeds
     scatter = float(np.sqrt((chances * (1.0 - chances)).sum() * options.seeds))
+    unexpected = np.abs(theirs.mean(axis=1) - chances) > 0.5
     result = {
         "plans": str(options.plans),
         "planned": {key: planned.about.get(key) for key in ("world", "method", "timing", "drag", "model")},
@@ -96,9 +97,11 @@ def main() -> None:
         "expected_scatter": scatter,
         "rotorpy_crash_percent": 100.0 * float(theirs.mean()),
         "our_crash_percent": 100.0 * float(ours.mean()),
+        "unexpected_plans": np.flatnonzero(unexpected).tolist(),
     }
     print(f"RotorPy: {theirs.sum()} of {theirs.size} flights crashed ({result['rotorpy_crash_percent']:.1f} %)")
     print(f"expected by our simulator: {expected:.1f} +- {scatter:.1f} ({result['our_crash_percent']:.1f} %)")
+    print(f"plans that fared otherwise than expected: {result['unexpected_plans'] or 'none'}")
     if options.out:
         options.out.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
 

@@ -39,12 +39,16 @@ def _tell_link(terminal: Terminal, mission: Mission) -> None:
 
 def tell_mission(terminal: Terminal, mission: Mission) -> None:
     """The line of the check."""
+    from lcd_flight.mission.hints import hints
+
     facts = mission_facts(mission)
     terminal.line(
         "CHECK",
         f"mission ok: {mission.name}, {facts['waypoints']} waypoints, {facts['length_m']:.1f} m, "
         f"waypoints {facts['fence_clearance_m']:.2f} m or more inside the fence, path not planned yet",
     )
+    for hint in hints(mission):
+        terminal.warn(hint)
 
 
 def mission_facts(mission: Mission) -> dict[str, Any]:

@@ -38,17 +38,16 @@ def tell_plan(
     for note in flight.planned.notes:
         terminal.warn(note)
     for summary in flight.planned.summaries:
-        _tell_trajectory(terminal, summary, _whence(flight, summary, took_ms))
+        told = _source(flight) or ("from the cache" if summary.cached else f"{took_ms:.0f} ms")
+        _tell_trajectory(terminal, summary, told)
     if not flight.planned.summaries:
         terminal.line("PLAN", "no trajectory: take-off, holds and landing only")
     return flight
 
 
-def _whence(flight: PreparedFlight, summary: TrajectorySummary, took_ms: float) -> str:
-    """Where a plan comes from, or how long it took."""
-    if flight.planned.source:
-        return f"from {flight.planned.source}"
-    return "planned before, from the cache" if summary.cached else f"{took_ms:.0f} ms"
+def _source(flight: PreparedFlight) -> str:
+    """Which file a plan comes from; empty where it was planned."""
+    return f"from {flight.planned.source}" if flight.planned.source else ""
 
 
 def _tell_trajectory(terminal: Terminal, summary: TrajectorySummary, whence: str) -> None:

@@ -7,6 +7,9 @@ from pathlib import Path
 from lcd_flight.cli.terminal import Terminal, following
 from lcd_flight.errors import InputError, Outcome
 
+_MOST_LIKELY_YAW_RAD = 30.0
+"""Nearly five turns; headings in degrees soon come to more."""
+
 
 def plan_tasks(
     terminal: Terminal,
@@ -40,6 +43,8 @@ def plan_tasks(
         seed=seed,
     )
     given = load_tasks(tasks)
+    if (turn := float(abs(given.yaws_rad).max())) > _MOST_LIKELY_YAW_RAD:
+        terminal.warn(f"{tasks}: yaws go up to {turn:g}; they are read as radians, were degrees meant?")
     with following(terminal, "PLAN") as progress:
         plans = plan_all(given, planning, out, plugins.simulator(), progress)
     fell_back = int(plans.fell_back.sum())

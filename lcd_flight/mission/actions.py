@@ -8,7 +8,13 @@ from pydantic import Discriminator, Field, Tag
 
 from lcd_flight.mission.keys import Keys, Point, Real
 
-ITEM_KINDS = ("takeoff", "hold", "trajectory", "land")
+ITEM_KINDS = {
+    "takeoff": "{height: 1.0}",
+    "hold": "{duration: 2.0}",
+    "trajectory": "{waypoints: [...]}",
+    "land": "{}",
+}
+"""What an item of a plan may be, each with the least that can stand behind its colon."""
 
 
 class Takeoff(Keys):

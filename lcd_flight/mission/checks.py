@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
 from typing import TypeAlias
 
-from lcd_flight.mission.actions import Land, Takeoff, Waypoint
+from lcd_flight.mission.actions import ITEM_KINDS, Land, Takeoff, Waypoint
 from lcd_flight.mission.draft import Draft
 from lcd_flight.mission.problems import Key
 from lcd_flight.mission.sections import Battery, GeofenceKeys, MotionCapture, Planner, Rehearse, Safety, VehicleKeys
@@ -91,7 +91,7 @@ def plan_order(draft: Draft) -> Found:
         return
     for kind, place, index in (("takeoff", "first", 0), ("land", "last", len(kinds) - 1)):
         if kind not in kinds:
-            yield ("plan",), f"has no {kind}; add `- {kind}:` as its {place} item"
+            yield ("plan",), f"has no {kind}; add `- {kind}: {ITEM_KINDS[kind]}` as its {place} item"
         for found, other in enumerate(kinds):
             if other == kind and found != index:
                 yield (

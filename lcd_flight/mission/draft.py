@@ -8,11 +8,16 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from lcd_flight.mission.actions import Waypoint, kind_of
+from lcd_flight.mission.actions import ITEM_KINDS, Waypoint, kind_of
 from lcd_flight.mission.keys import Keys
 from lcd_flight.mission.problems import Key
 
 Model = TypeVar("Model", bound=Keys)
+
+
+def _is_kind(item: Any) -> bool:
+    """Whether an item is a bare word that names a kind."""
+    return isinstance(item, str) and item in ITEM_KINDS
 
 
 class Draft:
@@ -32,8 +37,8 @@ class Draft:
             return None
 
     def item_kinds(self) -> list[str | None]:
-        """What each item of the plan is; None for what is no item."""
-        return [kind_of(item) for item in self._list("plan")]
+        """What each item of the plan is, also of a bare word (`- land`); None for what is no item."""
+        return [item if _is_kind(item) else kind_of(item) for item in self._list("plan")]
 
     def items(self, kind: str, model: type[Model]) -> Iterator[tuple[Key, Model]]:
         """The plan's items of one kind that are right, each with its key."""

@@ -99,6 +99,8 @@ def _wrong_type(what: str) -> Callable[[ErrorDetails, Place | None], str]:
     def explain(detail: ErrorDetails, place: Place | None) -> str:
         unit = f" in {place.unit}" if place and place.unit and what.endswith("number") else ""
         value = detail["input"]
+        if value is None and place and place.attribute in ITEM_KINDS:
+            return f"is empty; write `- {place.attribute}: {ITEM_KINDS[place.attribute]}`"
         if value is None:
             return f"is empty; write {what}{unit}, or remove the key"
         quoted = " without quotes" if isinstance(value, str) and _is_number(value) else ""
@@ -151,6 +153,8 @@ def _length(detail: ErrorDetails, _: Place | None) -> str:
 
 def _no_item(detail: ErrorDetails, _: Place | None) -> str:
     value = detail["input"]
+    if isinstance(value, str) and value in ITEM_KINDS:
+        return f"{value} lacks its colon and what stands behind it; write `- {value}: {ITEM_KINDS[value]}`"
     word = next(iter(value), "") if isinstance(value, dict) else value
     shown_word = word if isinstance(value, dict) and word else shown(value)
     return f"{shown_word} is no item of a plan; {did_you_mean(str(word), ITEM_KINDS)}"

@@ -105,9 +105,7 @@ class PlanRecord(Record):
         if len(asked) == len(task.durations_s) and apart.max() <= SAME_POINT:
             return None
         here, there = float(task.durations_s.sum()), sum(asked)
-        return (
-            f"was planned to take {there:.3f} s by the mission's speed or times, the mission now asks for {here:.3f} s"
-        )
+        return f"was planned for {there:.3f} s from the first waypoint to the last, the mission asks for {here:.3f} s"
 
     def _uneven_predictions(self) -> str | None:
         for name in ("segment_errors_m", "minimum_snap_segment_errors_m"):

@@ -371,7 +371,7 @@ ONE_PROBLEM = {
     "item that is no mapping": (
         "- hold: {duration: 2.0}",
         "- hold",
-        '17: plan[1]: "hold" is no item of a plan; did you mean hold? (one of takeoff, hold, trajectory, land)',
+        "17: plan[1]: hold lacks its colon and what stands behind it; write `- hold: {duration: 2.0}`",
     ),
     "two actions in one item": (
         "- hold: {duration: 2.0}",
@@ -387,7 +387,7 @@ ONE_PROBLEM = {
     "nothing lands": (
         "  - land: {duration: 2.5}\n",
         "",
-        "15: plan: has no land; add `- land:` as its last item",
+        "15: plan: has no land; add `- land: {}` as its last item",
     ),
     "something after the landing": (
         "  - land: {duration: 2.5}\n",

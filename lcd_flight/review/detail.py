@@ -61,7 +61,7 @@ def samples(time_s: FloatArray, values: FloatArray, most: int) -> tuple[FloatArr
     count = len(values)
     if count <= most:
         return time_s, values
-    width = math.ceil(2 * count / most)
+    width = math.ceil(count / (most // 2))
     bins = math.ceil(count / width)
     padded = np.full(bins * width, np.nan)
     padded[:count] = values

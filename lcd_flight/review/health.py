@@ -49,10 +49,10 @@ def thrust(log: FlightLog) -> Panel:
     return Panel("Thrust and saturation", charts, "Shaded red: a motor or the thrust command at its limit.")
 
 
-def stretches(time_s: FloatArray, flags: BoolArray, most: int = _MOST_STRETCHES) -> list[tuple[float, float]]:
-    """Begin and end of each stretch of true flags, a tick at least; gaps are closed below a `most`-th of the time."""
+def stretches(time_s: FloatArray, flags: BoolArray) -> list[tuple[float, float]]:
+    """Begin and end of each stretch of true flags, a tick at least; gaps too small to see are closed."""
     tick_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.01
-    gap_s = max(1.5 * tick_s, (float(time_s[-1]) - float(time_s[0])) / most)
+    gap_s = max(1.5 * tick_s, (float(time_s[-1]) - float(time_s[0])) / _MOST_STRETCHES)
     found: list[tuple[float, float]] = []
     for begin_s in time_s[flags].tolist():
         if found and begin_s - found[-1][1] <= gap_s:

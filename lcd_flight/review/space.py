@@ -9,18 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from lcd_flight.model import FlightPlan, Trajectory
-from lcd_flight.model.types import FloatArray
+from lcd_flight.model.types import BoolArray, FloatArray
 from lcd_flight.record import FlightLog
-from lcd_flight.review.health import stretches
 from lcd_flight.review.spans import airborne
 
 COLORS = "abcdef"
 """CSS classes that tell flights apart; more flights begin again."""
 
 _PATH_STEP_S = 0.04
-_MOST_FLOWN_POINTS = 1000
-_MOST_SATURATED = 60
-"""Stretches that are marked on the path."""
+_MOST_FLOWN_POINTS = 4000
 _WIDEST_FENCE = 2.5
 """A fence that is so many times as wide as the path is not fitted into the drawing."""
 
@@ -132,17 +129,24 @@ def baselines(plan: FlightPlan) -> list[Trajectory]:
 
 def _flown(log: FlightLog, zero_s: float, style: str) -> Flown:
     series = log.series
-    known = airborne(series) & np.isfinite(series.p_WB).all(axis=1)
-    ticks = np.flatnonzero(known)
-    ticks = ticks[:: max(1, math.ceil(len(ticks) / _MOST_FLOWN_POINTS))]
-    hot = stretches(series.time_s, series.saturated & known, _MOST_SATURATED) if style == "flown" else []
-    pieces = [series.p_WB[known & (series.time_s >= begin) & (series.time_s <= end)] for begin, end in hot]
+    ticks = np.flatnonzero(airborne(series) & np.isfinite(series.p_WB).all(axis=1))
+    drawn = np.arange(0, len(ticks), max(1, math.ceil(len(ticks) / _MOST_FLOWN_POINTS)))
+    points = series.p_WB[ticks[drawn]]
+    saturated = np.logical_or.reduceat(series.saturated[ticks], drawn) if len(drawn) else np.empty(0, dtype=np.bool_)
     return Flown(
-        points=series.p_WB[ticks],
-        time_s=series.time_s[ticks] - zero_s,
+        points=points,
+        time_s=series.time_s[ticks[drawn]] - zero_s,
         style=style,
-        saturated=tuple(piece for piece in pieces if len(piece) > 1),
+        saturated=tuple(_pieces(points, saturated)) if style == "flown" else (),
     )
+
+
+def _pieces(points: FloatArray, flags: BoolArray) -> Iterator[FloatArray]:
+    """The stretches of points (N, 3) with flags (N,), each to the point after it."""
+    edges = np.flatnonzero(np.diff(flags, prepend=False, append=False)).tolist()
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        piece = points[begin : end + 1]
+        yield piece if len(piece) > 1 else points[max(begin - 1, 0) : end]
 
 
 def _sampled(trajectory: Trajectory) -> FloatArray:

@@ -80,23 +80,18 @@ def _shapes(space: Space, view: View, *, still: bool) -> Iterator[Html]:
     yield from (_line(baseline, view, "baseline") for baseline in space.baselines)
     yield from (_line(reference, view, "reference") for reference in space.references)
     for number, row in enumerate(space.flown):
-        yield from _flown(number, row, view, still=still)
+        yield from _flown(number, row, view)
     yield from (_mark(point, view, "waypoint", str(number)) for number, point in enumerate(space.waypoints, start=1))
     yield from _triad(space, view)
     if not still:
         yield from (_vehicle(number, row, view) for number, row in enumerate(space.flown) if len(row.points))
 
 
-def _flown(number: int, row: Flown, view: View, *, still: bool) -> Iterator[Html]:
-    """The path: faint as a whole, and strong where the window of time is."""
-    if not len(row.points):
-        return
+def _flown(number: int, row: Flown, view: View) -> Iterator[Html]:
+    """The path, with its saturated pieces behind it."""
     yield from (_line(piece, view, "hot") for piece in row.saturated)
-    if still:
-        yield _line(row.points, view, f"path {row.style}")
-        return
-    yield _line(row.points, view, f"rest {row.style}")
-    yield _line(row.points, view, f"path {row.style}", flight=number)
+    if len(row.points):
+        yield _line(row.points, view, f"path {row.style}", flight=number)
 
 
 def _vehicle(number: int, row: Flown, view: View) -> Html:

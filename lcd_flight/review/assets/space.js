@@ -16,6 +16,12 @@ const MOST_PATH_POINTS = 1500;
 let viewChanged = true;
 let playedWindow = "";
 
+// The whole path stays behind, faint, where the strong line is cut to the window.
+for (const path of space.querySelectorAll(".path")) {
+  const rest = path.cloneNode();
+  rest.classList.replace("path", "rest");
+  path.before(rest);
+}
 const shapes = [...space.querySelectorAll("[data-xyz]")].map((element) => ({
   element,
   points: element.dataset.xyz.split(" ").map((point) => point.split(",").map(Number)),

@@ -16,11 +16,12 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lcd_flight import plugins
 from lcd_flight.flight.progress import Progress
+from lcd_flight.flight.recording import Recording
 from lcd_flight.flight.result import FlightResult
 from lcd_flight.flight.session import FlightOptions, run_flight
 from lcd_flight.mission import Mission, load_mission
@@ -30,9 +31,11 @@ from lcd_flight.mission.plan_csv import planned_from_csv
 from lcd_flight.mission.plan_file import planned_from_file, write_plan
 from lcd_flight.mission.plan_mission import plan_mission
 from lcd_flight.mission.planned import PlannedMission
-from lcd_flight.model import LegKind, RefusedError, Vehicle
-from lcd_flight.observers.log_thread import LogStatistics, LogThread
-from lcd_flight.record import FlightHeader, LogWriter, Prediction, log_path, read_log
+from lcd_flight.model import LegKind, Observer, Vehicle
+from lcd_flight.observers.live import ENDPOINT as LIVE_ENDPOINT
+from lcd_flight.observers.log_thread import LogStatistics
+from lcd_flight.record import FlightHeader, Prediction, log_path, read_log
+from lcd_flight.record.machine import this_machine
 from lcd_flight.rehearsal.rehearse import rehearse as fly_in_simulation
 from lcd_flight.rehearsal.verdict import Rehearsal
 from lcd_flight.review.figures import FlightFigures, figures_of
@@ -117,12 +120,16 @@ def fly(
     options: FlightOptions | None = None,
     *,
     log_folder: Path | None = None,
+    live: str | None = LIVE_ENDPOINT,
+    observers: Sequence[Observer] = (),
     progress: Progress | None = None,
 ) -> FlownMission:
     """Fly a plan that was rehearsed, log it and write its review page.
 
     rehearsal: of this plan; made here where it is None.
     log_folder: in place of the mission's `log.dir`.
+    live: where the flight is published for `lcd monitor`; None for nowhere. In virtual time nobody can watch.
+    observers: told of every tick beside the log; they must not wait.
 
     Raises:
         InputError: the link or the endpoint is wrong.
@@ -135,20 +142,15 @@ def fly(
     started = datetime.datetime.now(datetime.UTC).astimezone()
     path = log_path(log_folder or flight.mission.log.dir, flight.mission.name, started)
     header = _header(flight, rehearsal, options, started)
-    try:
-        writer = LogWriter(path, header)
-    except OSError as error:
-        raise RefusedError(f"cannot write the flight log {path}: {error.strerror}; choose --log DIR") from error
-    thread = LogThread(writer, lossless=options.fast)
-    try:
+    with Recording(path, header, live=None if options.fast else live, lossless=options.fast) as recording:
+        listeners = (*recording.observers, *observers)
         result = run_flight(
-            flight.mission, flight.planned.plan, flight.vehicle, options, observers=(thread,), progress=progress
+            flight.mission, flight.planned.plan, flight.vehicle, options, observers=listeners, progress=progress
         )
-    finally:
-        thread.close()
     log = read_log(path)
     report = write_page(log, path.with_suffix(".html"))
-    return FlownMission(result, figures_of(log), path, thread.statistics, report)
+    result = replace(result, notes=(*result.notes, *recording.notes))
+    return FlownMission(result, figures_of(log), path, recording.statistics, report)
 
 
 def _header(
@@ -170,6 +172,7 @@ def _header(
         predicted_max_error_m=rehearsal.max_error_m,
         predictions=_predictions(flight.planned),
         notes={"rehearsal": rehearsal.text, **_plan_note(flight.planned)},
+        versions=this_machine(),
     )
 
 

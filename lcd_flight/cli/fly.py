@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from lcd_flight.cli.mission import MissionArgument
-from lcd_flight.cli.options import Json, NoColor, Quiet
+from lcd_flight.cli.options import LIVE_ENDPOINT, Json, NoColor, Quiet
 from lcd_flight.cli.plan import NoCache, PlanFile
 from lcd_flight.cli.plan_display import plan_facts, tell_plan
 from lcd_flight.cli.terminal import Terminal
@@ -33,6 +33,7 @@ def fly(
     rehearse: Annotated[int | None, typer.Option(help="Runs of the rehearsal.", min=1, max=10_000)] = None,
     yes: Annotated[bool, typer.Option("--yes", help="Arm without asking.")] = False,
     log: Annotated[Path | None, typer.Option(help="Folder for log and report.", metavar="DIR")] = None,
+    live: Annotated[str, typer.Option(help="Where `lcd monitor` may watch, or `off`.")] = LIVE_ENDPOINT,
     json: Json = False,
     quiet: Quiet = False,
     no_color: NoColor = False,
@@ -58,7 +59,7 @@ def fly(
         return terminal.fail(Outcome.REFUSED, rehearsal.refusal, facts)
     if plan_only:
         return terminal.finish(Outcome.OK, {**plan_facts(flight), **facts})
-    flown = _fly(terminal, flight, rehearsal, options, log)
+    flown = _fly(terminal, flight, rehearsal, options, log, None if live == "off" else live)
     return _finish(terminal, flown)
 
 
@@ -106,13 +107,18 @@ def _simulated(mission: Mission, uri: str | None) -> bool:
 
 
 def _fly(
-    terminal: Terminal, flight: PreparedFlight, rehearsal: Rehearsal, options: FlightOptions, log: Path | None
+    terminal: Terminal,
+    flight: PreparedFlight,
+    rehearsal: Rehearsal,
+    options: FlightOptions,
+    log: Path | None,
+    live: str | None,
 ) -> FlownMission:
     from lcd_flight import api
     from lcd_flight.cli.flight_display import FlightDisplay
 
     with FlightDisplay(terminal) as display:
-        return api.fly(flight, rehearsal, options, log_folder=log, progress=display)
+        return api.fly(flight, rehearsal, options, log_folder=log, live=live, progress=display)
 
 
 def _finish(terminal: Terminal, flown: FlownMission) -> int:

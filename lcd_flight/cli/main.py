@@ -19,6 +19,7 @@ from lcd_flight.cli import (
     fly,
     learning,
     mission,
+    monitor,
     plan,
     recover,
     replay,
@@ -50,6 +51,7 @@ app.command("review")(review.review)
 app.command("replay")(replay.replay)
 app.command("recover")(recover.recover)
 app.command("export")(export.export)
+app.command("monitor")(monitor.monitor)
 app.command("bench")(bench.bench)
 app.add_typer(sim.app, name="sim")
 

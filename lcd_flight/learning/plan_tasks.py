@@ -75,6 +75,8 @@ def plan_tasks(
         InputError: no such method or drag configuration, a model that is missing or does not fit, waypoints that make
             no trajectory, or a place that cannot be written to.
     """
+    if out.suffix != ".npz" or out.is_dir():
+        raise InputError(f"{out}: plans go to a file whose name ends in .npz")
     method, problem = find_method(planning.method), _problem(tasks, planning, simulator)
     about = _about(planning, problem)
     folder = out.with_name(f".{out.name}.blocks") / fingerprint({**about, "tasks": hash_of_tasks(tasks)})

@@ -15,6 +15,8 @@ def write_whole(path: Path, content: str | bytes) -> None:
     Raises:
         InputError: the place cannot be written to.
     """
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; name a file in it")
     partial = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         partial.write_bytes(content.encode() if isinstance(content, str) else content)

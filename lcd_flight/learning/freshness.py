@@ -60,5 +60,4 @@ def _shipped_models() -> list[Path]:
 
 
 def _planner_sources() -> list[Path]:
-    learning = Path(__file__).parent
-    return [*(_HOUSE / "planning").rglob("*.py"), *(learning / name for name in _JUDGED_BY)]
+    return [*(_HOUSE / "planning").rglob("*.py"), *(_HOUSE / "learning" / name for name in _JUDGED_BY)]

@@ -1,48 +1,23 @@
 """Evaluation against rates worked out by hand, with a simulator whose every answer is known."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from known_simulator import KnownSimulator, tasks_with_errors
 
 from lcd_flight.learning import methods
 from lcd_flight.learning.evaluate import evaluate
-from lcd_flight.learning.evaluation import EvaluationOptions
+from lcd_flight.learning.evaluation import Evaluation, EvaluationOptions
 from lcd_flight.learning.methods import Planned, Problem
 from lcd_flight.learning.sampling import first_tasks
-from lcd_flight.model import InputError, RolloutLabels, Tasks, TaskSampler, World
+from lcd_flight.model import InputError, Tasks, TaskSampler, World
 from lcd_flight.model.streams import Stream
 from lcd_flight.planning.minimum_snap import minimum_snap_batch
 from lcd_flight.worlds import load_world
 
 WORLD: World = load_world("crazyflie-saturated")
-
-
-class KnownSimulator:
-    """Errors that are a plain function of the plan: its largest error is x of the first waypoint, in m."""
-
-    def __init__(self, broken_from=None):
-        self.broken_from = broken_from
-        self.calls = []
-
-    def rollout(self, plans, vehicle, seeds, options):
-        self.calls.append((plans, vehicle, seeds, options))
-        n, segments = plans.durations_s.shape
-        error = plans.coefficients[:, 0, 0, 0].copy()
-        waypoint = np.tile(error[:, None], (1, segments + 1)) * 0.5
-        waypoint[:, -1] = np.nan
-        flat = np.zeros(n)
-        valid = np.ones(n, bool) if self.broken_from is None else error < self.broken_from
-        return RolloutLabels(
-            error, flat, flat, flat, flat, np.zeros((n, segments)), waypoint, flat, flat, flat, flat + 0.25, flat, valid
-        )
-
-
-def tasks_with_errors(errors):
-    waypoints = np.zeros((len(errors), 4, 3))
-    waypoints[:, :, 0] = np.asarray(errors)[:, None]
-    waypoints[:, :, 1] = np.arange(4) * 2.0
-    return Tasks(waypoints, np.zeros((len(errors), 4)))
 
 
 def test_rates_and_errors_by_hand():
@@ -104,11 +79,121 @@ def test_methods_share_tasks_and_noise_whatever_the_chunks(stiff, monkeypatch):
     assert np.array_equal(pieces.runs["stiff"].fell_back, run.runs["stiff"].fell_back)
 
 
-def test_the_drag_and_the_number_of_noise_seeds_are_options():
+def test_drags_and_the_number_of_noise_seeds_are_options():
     simulator = KnownSimulator()
-    options = EvaluationOptions(drags=(5,), noise_seeds=2)
-    assert evaluate(WORLD, ["minimum-snap"], 4, simulator, options).methods["minimum-snap"].noise_seeds == 2
-    assert simulator.calls[0][1] == WORLD.vehicle(5)
+    options = EvaluationOptions(drags=(5, 2), noise_seeds=2)
+    run = evaluate(WORLD, ["minimum-snap"], tasks_with_errors([0.1, 1.6, 1.7]), simulator, options)
+    assert [call[1] for call in simulator.calls] == [WORLD.vehicle(5), WORLD.vehicle(2)]
+    assert np.array_equal(simulator.calls[0][2], simulator.calls[1][2])
+    assert run.runs["minimum-snap"].crashed.shape == (3, 2, 2)
+    assert run.methods["minimum-snap"] == run.at(2)["minimum-snap"]
+    with pytest.raises(ValueError, match="not in tuple"):
+        run.at(3)
+
+
+def test_tasks_are_the_clusters_not_flights():
+    """The same tasks in five drag configurations are no more evidence than in one, if all fly alike."""
+    tasks = tasks_with_errors([0.1, 0.2, 1.6, 1.7])
+    one, five = (
+        evaluate(WORLD, ["minimum-snap"], tasks, KnownSimulator(), EvaluationOptions(drags=drags)).methods
+        for drags in ((3,), (1, 2, 3, 4, 5))
+    )
+    assert one["minimum-snap"].crash_rate_error == pytest.approx(five["minimum-snap"].crash_rate_error)
+    assert one["minimum-snap"].crash_rate_low == pytest.approx(five["minimum-snap"].crash_rate_low)
+
+
+def test_a_weaker_vehicle_is_flown_but_not_planned_for(monkeypatch):
+    seen = []
+
+    def plan(problem: Problem) -> Planned:
+        seen.append(problem.vehicle)
+        return methods.minimum_snap(problem)
+
+    monkeypatch.setitem(methods.METHODS, "watched", plan)
+    simulator = KnownSimulator()
+    evaluate(WORLD, ["watched"], tasks_with_errors([0.1]), simulator, EvaluationOptions(thrust_share=0.95))
+    ((_, flown, _, options),) = simulator.calls
+    believed = WORLD.vehicle(3)
+    assert set(seen) == {believed}
+    assert options.nominal == believed
+    assert flown.k_eta == pytest.approx(0.95 * believed.k_eta)
+    assert flown.parasitic_drag == believed.parasitic_drag
+
+
+def test_a_method_says_which_controller_flies_its_plans(monkeypatch):
+    monkeypatch.setitem(methods.METHODS, "other", lambda p: replace(methods.minimum_snap(p), controller="another-law"))
+    simulator = KnownSimulator()
+    evaluate(WORLD, ["minimum-snap", "other"], tasks_with_errors([0.1]), simulator)
+    assert [call[3].controller for call in simulator.calls] == ["geometric", "another-law"]
+
+
+def test_yaw_by_the_short_way_turns_less_than_half_a_turn():
+    given = tasks_with_errors([0.1])
+    long = Tasks(given.waypoints_m, np.array([[0.0, 5.0, -1.0, 3.0]]))
+    flown = {}
+    for yaw in ("as-sampled", "short"):
+        simulator = KnownSimulator()
+        evaluate(WORLD, ["minimum-snap"], long, simulator, EvaluationOptions(yaw=yaw))
+        flown[yaw] = simulator.calls[0][0][0].waypoints()[:, 3]
+    assert np.allclose(flown["as-sampled"], long.yaws_rad[0])
+    assert (np.abs(np.diff(flown["short"])) < np.pi).all()
+    assert np.allclose(np.sin(flown["short"] - long.yaws_rad[0]), 0.0, atol=1e-9)
+
+
+def test_methods_are_compared_task_by_task(monkeypatch):
+    """Moved by 1 m in x, tasks 0.6 and 0.7 crash too: two tasks worse, none better."""
+
+    def moved(problem: Problem) -> Planned:
+        poses = problem.tasks.poses.copy()
+        poses[..., 0] += 1.0
+        return Planned(minimum_snap_batch(poses, problem.durations_s), np.zeros(len(poses), bool))
+
+    monkeypatch.setitem(methods.METHODS, "moved", moved)
+    tasks = tasks_with_errors([0.1, 0.2, 0.6, 0.7, 1.6])
+    run = evaluate(WORLD, ["moved", "minimum-snap"], tasks, KnownSimulator())
+    pair = run.compare("moved", "minimum-snap")
+    assert pair.difference == pytest.approx(40.0)
+    assert (pair.tasks_better, pair.tasks_worse) == (0, 2)
+    with pytest.raises(InputError, match="method learned was not evaluated"):
+        run.compare("moved", "learned")
+
+
+def test_evaluations_by_models_of_their_own_are_put_side_by_side():
+    tasks, simulator = tasks_with_errors([0.1, 1.6]), KnownSimulator()
+    single = [evaluate(WORLD, ["minimum-snap"], tasks, simulator, EvaluationOptions(drags=(drag,))) for drag in (2, 4)]
+    whole = evaluate(WORLD, ["minimum-snap"], tasks, simulator, EvaluationOptions(drags=(2, 4)))
+    together = Evaluation.beside(single)
+    assert together.options == whole.options
+    for name in ("crashed", "max_error_m", "relative_snap", "fell_back"):
+        assert np.array_equal(getattr(together.runs["minimum-snap"], name), getattr(whole.runs["minimum-snap"], name))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"drags": ()}, "give at least one"),
+        ({"drags": (3, 3)}, "each once"),
+        ({"noise_seeds": 0}, "0 noise seeds"),
+        ({"thrust_share": 0.0}, "thrust share 0"),
+        ({"thrust_share": float("nan")}, "thrust share nan"),
+    ],
+)
+def test_options_that_cannot_be_flown_are_refused(options, message):
+    with pytest.raises(InputError, match=message):
+        EvaluationOptions(**options)
+
+
+def test_a_model_of_another_vehicle_is_refused_before_any_flight():
+    simulator = KnownSimulator()
+    with pytest.raises(InputError, match="trained for another vehicle"):
+        evaluate(
+            load_world("hummingbird-paper"),
+            ["minimum-snap", "learned"],
+            5,
+            simulator,
+            EvaluationOptions(model="crazyflie-paper"),
+        )
+    assert not simulator.calls
 
 
 def test_another_seed_means_other_tasks_and_other_noise():

@@ -24,7 +24,7 @@ def connect(uri: str, toc_cache: Path, clock: Clock, limit_s: float, cancelled: 
         RefusedError: nobody answers, or the driver cannot be opened; with the remedy.
     """
     deadline_ns = clock.now_ns() + round(limit_s * 1e9)
-    unheard = 0
+    heard, unheard = False, 0
     while True:
         session = Session(toc_cache, clock)
         connected = False
@@ -35,8 +35,14 @@ def connect(uri: str, toc_cache: Path, clock: Clock, limit_s: float, cancelled: 
                 session.shut()
         if connected:
             return session
-        unheard += session.received == 0
-        _give_up(session, uri, clock.now_ns() >= deadline_ns or unheard >= UNHEARD_ATTEMPTS, cancelled)
+        heard, unheard = heard or session.received > 0, unheard + (session.received == 0)
+        if session.failure:
+            remedy = "plug in the radio or cable, and check the rights to it"
+            raise RefusedError(f"cannot open {uri} ({session.failure}): {remedy}")
+        if cancelled.is_set():
+            raise RefusedError(f"connecting to {uri} was interrupted")
+        if clock.now_ns() >= deadline_ns or unheard >= UNHEARD_ATTEMPTS:
+            raise RefusedError(_in_vain(uri, heard))
 
 
 def _completed(session: Session, uri: str, clock: Clock, deadline_ns: int, cancelled: threading.Event) -> bool:
@@ -50,22 +56,8 @@ def _completed(session: Session, uri: str, clock: Clock, deadline_ns: int, cance
     return True
 
 
-def _give_up(session: Session, uri: str, last: bool, cancelled: threading.Event) -> None:
-    """Refuse where another attempt is of no use.
-
-    Raises:
-        RefusedError: it is not.
-    """
-    if session.failure:
-        raise RefusedError(
-            f"cannot open {uri} ({session.failure}): plug in the radio or cable, and check the rights to it"
-        )
-    if cancelled.is_set():
-        raise RefusedError(f"connecting to {uri} was interrupted")
-    if not last:
-        return
-    if session.received == 0:
-        raise RefusedError(f"no answer from {uri}: is the vehicle on, in range, and at this address?")
-    raise RefusedError(
-        f"the connection to {uri} does not come about: the link loses too much, or another program holds it"
-    )
+def _in_vain(uri: str, heard: bool) -> str:
+    """Why no attempt came to its end."""
+    if not heard:
+        return f"no answer from {uri}: is the vehicle on, in range, and at this address?"
+    return f"the connection to {uri} does not come about: the link loses too much, or another program holds the vehicle"

@@ -41,8 +41,10 @@ class Connection:
         self._cancelled = threading.Event()
         self._executor = ThreadPoolExecutor(1, "crazyflie-setup")
 
-    async def open(self, fallback: Callable[[], bytes]) -> None:
+    async def open(self, fallback: Callable[[], bytes], accept: Callable[[Session], None]) -> None:
         """Connect, listen, stream poses, set parameters, reset the estimator.
+
+        fallback: makes the fallback's packet. accept: raises where this vehicle is not to be flown.
 
         Raises:
             RefusedError: nobody answers, a parameter does not hold, or the estimate does not agree with motion capture.
@@ -53,6 +55,7 @@ class Connection:
         self.session = session = await self._elsewhere(
             lambda: connect(self.uri, toc, self._clock, limit_s, self._cancelled)
         )
+        accept(session)
         await self._listen(session)
         watchdog = crtp_wire.emergency_watchdog(session.protocol) if self._context.on_link_lost == "cut" else None
         outbox = Outbox(fallback, self._options.pose_rate_hz, watchdog)

@@ -82,8 +82,7 @@ class CrazyflieLink:
                 the firmware needs another thrust map.
         """
         try:
-            await self._connection.open(self._fallback)
-            self._check_thrust_map()
+            await self._connection.open(self._fallback, self._check_thrust_map)
         except BaseException:
             await self._connection.close()
             raise
@@ -185,8 +184,7 @@ class CrazyflieLink:
             raise RefusedError(refusal)
         return sender, session
 
-    def _check_thrust_map(self) -> None:
-        _, session = self._opened("the link is not open")
+    def _check_thrust_map(self, session: Session) -> None:
         if self._map.force_linear and session.protocol < FORCE_LINEAR_PROTOCOL:
             raise RefusedError(
                 f"firmware with CRTP protocol {session.protocol} is older than thrust that is linear in force: update "

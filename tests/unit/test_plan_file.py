@@ -194,6 +194,6 @@ def test_places_that_cannot_be_read_or_written(tmp_path: Path) -> None:
         planned_from_file(tmp_path / "none.json", mission(), VEHICLE)
     with pytest.raises(InputError, match=r"plan\.json: cannot be written \(No such file or directory\)"):
         write_plan(tmp_path / "no" / "plan.json", planned(), mission(), VEHICLE)
-    with pytest.raises(InputError, match="cannot be written"):
+    with pytest.raises(InputError, match="is a folder; name a file in it"):
         write_plan(tmp_path, planned(), mission(), VEHICLE)
     assert [path.name for path in tmp_path.iterdir()] == []

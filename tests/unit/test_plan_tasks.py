@@ -6,9 +6,11 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from docs_pages import blocks
 
 from lcd_flight import plugins
 from lcd_flight.learning import plan_tasks as room
@@ -213,3 +215,15 @@ def test_wrong_plans_are_named(tmp_path: Path, arrays: dict[str, object], messag
     with pytest.raises(InputError) as caught:
         load_plans(saved(tmp_path, **arrays))
     assert message in str(caught.value)
+
+
+def test_the_code_of_the_page_reads_a_file(tmp_path: Path) -> None:
+    (block,) = blocks("plans.md", "python")
+    namespace: dict[str, Any] = {}
+    exec(compile(block.text, "docs/plans.md", "exec"), namespace)  # noqa: S102 - our own page
+    trajectory = plan(tmp_path / "plans.npz").trajectories[3]
+    times = np.linspace(0.0, trajectory.duration_s, 50)
+    with np.load(tmp_path / "plans.npz") as plans:
+        for order in (0, 1, 2):
+            read = [namespace["reference"](plans, 3, time_s, order) for time_s in times]
+            assert np.allclose(read, trajectory.derivative(times, order), atol=1e-9)

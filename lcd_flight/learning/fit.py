@@ -5,7 +5,6 @@ What comes out are plain arrays for `lcd_flight.planning.cost.network`, its twin
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -59,13 +58,13 @@ class Fitted:
 def fit(data: TrainingSet, settings: FitSettings, members: int, seed: int, report: Report) -> Fitted:
     """Train `members` networks on the training tasks of `data`, each with a start and an order of its own.
 
-    Side by side, one core each: small networks gain little from sharing one.
+    Side by side, one core each: networks this small gain nothing from sharing theirs, and lose much where others work.
 
     Raises:
         InputError: torch is not installed.
     """
     torch = require_torch()
-    torch.set_num_threads(max(1, (os.cpu_count() or 1) // members))
+    torch.set_num_threads(1)
     modules = [_module(data, settings, seed * 1000 + member) for member in range(members)]
     crew = _Crew(report)
     with ThreadPoolExecutor(members) as pool:

@@ -20,12 +20,14 @@ from lcd_flight.model import (
     Vehicle,
     World,
 )
-from lcd_flight.planning.cost.model_file import check_fits, load_model
+from lcd_flight.planning.cost.model_file import SUFFIX, check_fits, load_model
 from lcd_flight.planning.cost.proxy import ThrustProxy
+from lcd_flight.planning.cost.tracking_cost import CostModel
 from lcd_flight.planning.knots import Whitening
 from lcd_flight.planning.minimum_snap import minimum_snap_batch
 from lcd_flight.planning.planner import PlannerOptions, PlanResult, Timing, TrackingCost, plan_batch
 from lcd_flight.planning.polish import Candidate, polish
+from lcd_flight.planning.released import plan_released
 from lcd_flight.planning.search import Arena, SearchSettings
 from lcd_flight.planning.search import search as search_in_simulator
 from lcd_flight.worlds import fingerprint
@@ -85,6 +87,35 @@ def minimum_snap(problem: Problem) -> Planned:
     return Planned(plans, np.zeros(len(plans), bool))
 
 
+def minimum_snap_drag(problem: Problem) -> Planned:
+    """The paper's MS-GCD: the same plans, flown with the drag of the rotors compensated by a model (Svacha 2017)."""
+    return replace(minimum_snap(problem), controller="geometric-drag")
+
+
+def minimum_snap_l1(problem: Problem) -> Planned:
+    """The same plans, flown with drag compensated by L1 adaptation: the released code's MS-GCD, corrected."""
+    return replace(minimum_snap(problem), controller="geometric-l1")
+
+
+def paper(problem: Problem) -> Planned:
+    """The released objective: snap plus the exponential of a network on raw coefficients, at the paper's times.
+
+    Raises:
+        InputError: as `learned`, of the model whose name ends in `-paper-code`.
+    """
+    model = _fitting(problem, baseline_model(problem.model, "paper-code"))
+    return Planned(*plan_released(problem.tasks, problem.durations_s, model))
+
+
+def mlp_knots(problem: Problem) -> Planned:
+    """As `learned`, with the paper's network (100, 100, 20) on the 39 numbers that say which trajectory it is.
+
+    Raises:
+        InputError: as `learned`, of the model whose name ends in `-mlp-knots`.
+    """
+    return _solved(_solve(problem, *_learned_cost(problem, baseline_model(problem.model, "mlp-knots"))))
+
+
 def analytic(problem: Problem) -> Planned:
     """The projected solve on the analytic cost: no learning, no simulator."""
     return _solved(_solve_analytic(problem))
@@ -96,7 +127,7 @@ def learned(problem: Problem) -> Planned:
     Raises:
         InputError: the model is missing, damaged, or trained for another vehicle or loop.
     """
-    return _solved(_solve(problem, *_learned_cost(problem)))
+    return _solved(_solve(problem, *_learned_cost(problem, problem.model)))
 
 
 def search(problem: Problem) -> Planned:
@@ -120,7 +151,7 @@ def learned_polished(problem: Problem) -> Planned:
     Raises:
         InputError: as `learned`.
     """
-    return _polished(problem, [_solve(problem, *_learned_cost(problem)), _solve_analytic(problem)])
+    return _polished(problem, [_solve(problem, *_learned_cost(problem, problem.model)), _solve_analytic(problem)])
 
 
 def analytic_polished(problem: Problem) -> Planned:
@@ -128,11 +159,17 @@ def analytic_polished(problem: Problem) -> Planned:
     return _polished(problem, [_solve_analytic(problem)])
 
 
-def _learned_cost(problem: Problem) -> tuple[TrackingCost, PlannerOptions]:
-    model = load_model(problem.model)
-    check_fits(model, fingerprint(problem.vehicle, problem.world.loop), problem.world.loop)
+def _learned_cost(problem: Problem, name: str) -> tuple[TrackingCost, PlannerOptions]:
+    model = _fitting(problem, name)
     assert model.card is not None  # noqa: S101 - a loaded model has one
     return model, PlannerOptions(problem.timing, model.card.snap_weight)
+
+
+def _fitting(problem: Problem, name: str) -> CostModel:
+    """A model, if it is of the problem's vehicle and loop."""
+    model = load_model(name)
+    check_fits(model, fingerprint(problem.vehicle, problem.world.loop), problem.world.loop)
+    return model
 
 
 def _solve_analytic(problem: Problem) -> PlanResult:
@@ -156,6 +193,10 @@ def _polished(problem: Problem, solved: list[PlanResult]) -> Planned:
 
 METHODS: dict[str, Method] = {
     "minimum-snap": minimum_snap,
+    "minimum-snap-drag": minimum_snap_drag,
+    "minimum-snap-l1": minimum_snap_l1,
+    "paper": paper,
+    "mlp-knots": mlp_knots,
     "analytic": analytic,
     "learned": learned,
     "analytic-polished": analytic_polished,
@@ -173,6 +214,11 @@ def find_method(name: str) -> Method:
     if name not in METHODS:
         raise InputError(f"no method `{name}`; there are {', '.join(METHODS)}")
     return METHODS[name]
+
+
+def baseline_model(model: str, recipe: str) -> str:
+    """The model that a baseline uses beside a learned one: the same name or path, and the recipe's name after it."""
+    return f"{model.removesuffix(SUFFIX)}-{recipe}{SUFFIX if model.endswith(SUFFIX) else ''}"
 
 
 def shipped_model(world: World) -> str:

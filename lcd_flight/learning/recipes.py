@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from lcd_flight.learning.collect_config import CollectConfig
 from lcd_flight.learning.fit import FitSettings
@@ -12,6 +12,9 @@ from lcd_flight.learning.targets import TargetName
 from lcd_flight.model import InputError, World
 from lcd_flight.planning.cost.inputs import InputsName
 from lcd_flight.worlds import fingerprint as vehicle_fingerprint
+
+PAPER_LAYERS = (100, 100, 20)
+"""Widths of the paper's network."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,4 +96,48 @@ def full_recipe(name: str, worlds: tuple[World, ...], seed: int = 0) -> TrainCon
     return TrainConfig(name, worlds, seed, count=1_600_000, rounds=3, policy_tasks=51_200, members=2)
 
 
-RECIPES = {"small": small_recipe, "medium": medium_recipe, "full": full_recipe}
+def knots_recipe(name: str, worlds: tuple[World, ...], seed: int = 0) -> TrainConfig:
+    """The paper's network (100, 100, 20) on the 39 numbers of a trajectory, by our data and rounds."""
+    fit = FitSettings(hidden=PAPER_LAYERS, activation="elu")
+    return replace(medium_recipe(name, worlds, seed), inputs="knots", fit=fit)
+
+
+def convex_recipe(name: str, worlds: tuple[World, ...], seed: int = 0) -> TrainConfig:
+    """The same, convex in what a planner chooses at fixed times: the paper's future work."""
+    config = knots_recipe(name, worlds, seed)
+    return replace(config, fit=replace(config.fit, convex=True))
+
+
+def paper_code_recipe(name: str, worlds: tuple[World, ...], seed: int = 0) -> TrainConfig:
+    """As released: 200,000 minimum-snap trajectories, 96 raw coefficients, the summed cost, no rounds.
+
+    But for the optimiser: inputs are normalised (the released code has that written, and does not call it), and AdamW
+    stands for a thousand epochs of SGD.
+    """
+    return TrainConfig(
+        name,
+        worlds,
+        seed,
+        count=200_000,
+        rounds=0,
+        inputs="coefficients",
+        target="released",
+        mix=Mix(search=0.0, random=0.0, optimum=1.0),
+        fit=FitSettings(hidden=PAPER_LAYERS, activation="elu", batch=256, epochs=20),
+    )
+
+
+def optima_only_recipe(name: str, worlds: tuple[World, ...], seed: int = 0) -> TrainConfig:
+    """Our network on minimum-snap trajectories alone, which is how not to do it."""
+    return replace(small_recipe(name, worlds, seed), rounds=0, mix=Mix(search=0.0, random=0.0, optimum=1.0))
+
+
+RECIPES = {
+    "small": small_recipe,
+    "medium": medium_recipe,
+    "full": full_recipe,
+    "mlp-knots": knots_recipe,
+    "convex": convex_recipe,
+    "paper-code": paper_code_recipe,
+    "optima-only": optima_only_recipe,
+}

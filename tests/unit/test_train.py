@@ -194,7 +194,7 @@ def test_one_network_serves_one_vehicle_and_one_loop():
 def test_the_recipes_are_as_large_as_they_say():
     worlds = (WORLD, load_world("crazyflie-paper"))
     assert RECIPES["small"]("m", worlds).capacity == pytest.approx(1.0e6, rel=0.05)
-    assert RECIPES["full"]("m", worlds).capacity == pytest.approx(3.8e6, rel=0.05)
+    assert RECIPES["full"]("m", worlds).capacity == pytest.approx(4.1e6, rel=0.05)
 
 
 def test_a_missing_extra_is_one_clear_line(monkeypatch, sim, tmp_path):

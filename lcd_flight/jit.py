@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import threading
 import types
 from collections.abc import Callable, Iterable
 from functools import cache
@@ -18,6 +19,9 @@ from typing import Any, TypeVar
 from lcd_flight.errors import RefusedError
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+_ONE_AT_A_TIME = threading.Lock()
+"""numba's cache folder is a setting of the whole process: threads must not change it for each other."""
 
 _tell: Callable[[str], None] | None = None
 """Who wants to know of compilations."""
@@ -53,14 +57,15 @@ class Compiler:
         import numba
         from numba.core import config
 
-        _listen()
-        linked = _relink(function, self._inlined)
-        before = config.CACHE_DIR  # type: ignore[attr-defined]
-        config.CACHE_DIR = str(self._cache())  # type: ignore[attr-defined]
-        try:
-            return numba.njit(cache=True, **self._options)(linked)  # type: ignore[no-any-return]
-        finally:
-            config.CACHE_DIR = before  # type: ignore[attr-defined]
+        with _ONE_AT_A_TIME:
+            _listen()
+            linked = _relink(function, self._inlined)
+            before = config.CACHE_DIR  # type: ignore[attr-defined]
+            config.CACHE_DIR = str(self._cache())  # type: ignore[attr-defined]
+            try:
+                return numba.njit(cache=True, **self._options)(linked)  # type: ignore[no-any-return]
+            finally:
+                config.CACHE_DIR = before  # type: ignore[attr-defined]
 
     def _inlined(self, function: Callable[..., Any]) -> Any:
         """A plain function as numba can call it, its own callees first."""

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -71,3 +73,27 @@ def test_a_cache_that_cannot_be_written_is_refused_with_a_remedy(
     monkeypatch.setenv("LCD_CACHE_DIR", str(tmp_path / "file" / "cache"))
     with pytest.raises(RefusedError, match="LCD_CACHE_DIR"):
         jit.Compiler(Path(__file__)).kernel(_hypotenuse)
+
+
+def test_threads_do_not_change_the_cache_folder_for_each_other(
+    cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """numba's folder is one for the process: a thread that finds it empty would keep machine code where it stands."""
+    import numba
+    from numba.core import config
+
+    compile_now = numba.njit
+
+    def slowly(**options: object) -> object:
+        time.sleep(0.01)
+        return compile_now(**options)
+
+    monkeypatch.setattr(numba, "njit", slowly)
+    monkeypatch.chdir(tmp_path)
+    before = config.CACHE_DIR
+    compilers = [jit.Compiler(Path(__file__), fastmath=bool(n % 2)) for n in range(6)]
+    with ThreadPoolExecutor(6) as pool:
+        kernels = list(pool.map(lambda compiler: compiler.kernel(_scaled), compilers))
+    assert [kernel(2.0) for kernel in kernels] == [6.0] * 6
+    assert before == config.CACHE_DIR
+    assert [path.name for path in tmp_path.iterdir()] == ["cache"]

@@ -35,6 +35,7 @@ def collect(
     short_yaw: Annotated[
         float, typer.Option(help="Share of tasks that turn by the short way.", min=0.0, max=1.0)
     ] = 0.5,
+    shard_rows: Annotated[int, typer.Option(help="Most rows of a shard.", min=1)] = 1 << 15,
     threads: Annotated[int, typer.Option(help="Shards made side by side; 0: one on each core.", min=0)] = 0,
     ray: Annotated[str | None, typer.Option(help="Address of a Ray cluster to spread the shards over.")] = None,
     json: Json = False,
@@ -55,7 +56,9 @@ def collect(
     where = _world(world, vehicle, loop, waypoints)
     given = _given(plans, where, seed, short_yaw)
     digest = "" if given is None else given.sha256
-    config = CollectConfig(where, seed, mix=_mix(sources, given), short_yaw_share=short_yaw, plans_sha256=digest)
+    config = CollectConfig(
+        where, seed, mix=_mix(sources, given, shard_rows), short_yaw_share=short_yaw, plans_sha256=digest
+    )
     spread = _spread(threads, ray)
     terminal.announce_compilation()
     with following(terminal, "COLLECT") as progress:
@@ -103,13 +106,12 @@ def _given(path: Path | None, world: World, seed: int, short_yaw: float) -> Give
     return None if path is None else load_plans(path, world.sampler, seed, short_yaw)
 
 
-def _mix(sources: str | None, given: GivenPlans | None) -> Mix:
+def _mix(sources: str | None, given: GivenPlans | None, shard_rows: int) -> Mix:
     """As asked for; else the given plans alone, or the usual mix."""
     from lcd_flight.learning.mix import Mix, parse_mix
 
-    if sources is not None:
-        return parse_mix(sources)
-    return Mix() if given is None else parse_mix("plans=1")
+    usual = Mix(shard_rows=shard_rows) if given is None else parse_mix("plans=1", shard_rows)
+    return usual if sources is None else parse_mix(sources, shard_rows)
 
 
 def _spread(threads: int, ray: str | None) -> Spread:

@@ -15,6 +15,8 @@ import numpy as np
 from lcd_flight.learning.rollouts import Source
 from lcd_flight.model import InputError, IntArray
 
+SHARD_ROWS = 1 << 15
+"""Where nothing else is asked for."""
 _EXACT = 1e-9
 
 
@@ -39,7 +41,7 @@ class Mix:
     """Rows of a task of `random` and of `times`."""
     jitters: int = 16
     """Rows of a given plan: itself first, then jitters around it."""
-    shard_rows: int = 1 << 15
+    shard_rows: int = SHARD_ROWS
     """A whole shard has as many whole tasks as fit into so many rows."""
 
     def __post_init__(self) -> None:
@@ -94,7 +96,7 @@ SOURCES = {
 _NAMES = {source: name for name, source in SOURCES.items()}
 
 
-def parse_mix(text: str) -> Mix:
+def parse_mix(text: str, shard_rows: int = SHARD_ROWS) -> Mix:
     """A mix from `search=0.9,random=0.1`; sources that are not named get nothing.
 
     Raises:
@@ -109,7 +111,7 @@ def parse_mix(text: str) -> Mix:
             shares[name] = float(share)
         except ValueError as error:
             raise InputError(f"sources: {name}={share}: the share must be a number from 0 to 1") from error
-    return Mix(**shares)
+    return Mix(**shares, shard_rows=shard_rows)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -33,7 +33,8 @@ class LiveSource:
             self._socket.connect(self._endpoint)
         except zmq.ZMQError as error:
             self._context.destroy(linger=0)
-            raise InputError(f"{self._endpoint!r}: {error.strerror}; expected e.g. tcp://127.0.0.1:5565") from error
+            reason = zmq.strerror(error.errno)
+            raise InputError(f"{self._endpoint!r}: {reason}; expected e.g. tcp://127.0.0.1:5565") from error
         return self
 
     def __exit__(

@@ -116,7 +116,9 @@ class LivePublisher:
             self._socket.bind(endpoint)
         except zmq.ZMQError as error:
             self.close()
-            raise RefusedError(f"no live view: {endpoint} is not to be had ({error.strerror})") from error
+            raise RefusedError(
+                f"no live view at {endpoint}: {zmq.strerror(error.errno)}; --live tcp://HOST:PORT chooses another place"
+            ) from error
 
     def __call__(self, data: bytes) -> None:
         """Publish one message part."""

@@ -56,6 +56,7 @@ class Connection:
             lambda: connect(self.uri, toc, self._clock, limit_s, self._cancelled)
         )
         accept(session)
+        await self._elsewhere(session.identify)
         await self._listen(session)
         watchdog = crtp_wire.emergency_watchdog(session.protocol) if self._context.on_link_lost == "cut" else None
         outbox = Outbox(fallback, self._options.pose_rate_hz, watchdog)

@@ -104,10 +104,12 @@ class CrazyflieLink:
 
     @property
     def description(self) -> str:
-        """Protocol, firmware, thrust map and what hovering takes."""
-        session = self._connection.session
-        firmware = "" if session is None else f"CRTP protocol {session.protocol}, firmware {session.firmware}, "
-        return f"Crazyflie, {firmware}{self._map.described(self._context.vehicle)}"
+        """Platform, firmware, thrust map and what hovering takes."""
+        session, thrust = self._connection.session, self._map.described(self._context.vehicle)
+        if session is None:
+            return f"Crazyflie, {thrust}"
+        firmware = f"firmware {session.version or 'unknown'} ({session.revision}), CRTP protocol {session.protocol}"
+        return f"{session.device or 'Crazyflie'}, {firmware}; {thrust}"
 
     async def arm(self) -> None:
         """Arm where the vehicle does not by itself, and unlock it with a zero setpoint.

@@ -10,7 +10,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
+import queue
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -25,6 +27,11 @@ from lcd_flight.model import Clock
 
 logging.getLogger("cflib").addHandler(logging.NullHandler())  # what matters is told in our own words
 
+_FIRMWARE, _DEVICE = 1, 2
+"""Questions to the platform service, beside the protocol's version, which cflib asks (platformservice.h)."""
+_VERSIONS = 1
+"""Their channel."""
+_ASKED, _ANSWER_S = 3, 0.3
 MAX_FAULTS = 10
 """Kept until they are looked at: a peer that is gone refuses a hundred packets a second."""
 _JOIN_S = 1.5
@@ -52,6 +59,8 @@ class Session(Crazyflie):  # type: ignore[misc]  # cflib is untyped
         """Why the link could not be opened; empty where it was."""
         self.quality: float | None = None
         """Share of radio packets that were acknowledged at once."""
+        self.device = self.version = ""
+        """Platform and firmware in their own words, once `identify` has asked; empty where they do not say."""
         self._clock = clock
         self._faults: list[str] = []
         self.packet_received.add_callback(self._note_packet)
@@ -66,13 +75,34 @@ class Session(Crazyflie):  # type: ignore[misc]  # cflib is untyped
         return int(self.platform.get_protocol_version())
 
     @property
-    def firmware(self) -> str:
-        """Its revision, hexadecimal; `unknown` where it does not say."""
+    def revision(self) -> str:
+        """Of the firmware, hexadecimal; `unknown` where it does not say."""
         values = self.param.values.get("firmware", {})
         try:
             return f"{int(values['revision0']):08x}{int(values['revision1']):04x}"
         except (KeyError, ValueError):
             return "unknown"
+
+    def identify(self) -> None:
+        """Ask platform and firmware who they are. Blocks, for two seconds at most."""
+        self.version, self.device = self._ask_version(_FIRMWARE), self._ask_version(_DEVICE)
+
+    def _ask_version(self, command: int) -> str:
+        answers: queue.SimpleQueue[str] = queue.SimpleQueue()
+
+        def take(packet: CRTPPacket) -> None:
+            if packet.channel == _VERSIONS and len(packet.data) > 1 and packet.data[0] == command:
+                answers.put(bytes(packet.data[1:]).partition(b"\0")[0].decode("ascii", "replace"))
+
+        self.add_port_callback(CRTPPort.PLATFORM, take)
+        try:
+            for _ in range(_ASKED):
+                self.transmit(bytes([CRTPPort.PLATFORM << 4 | 0x0C | _VERSIONS, command]))
+                with contextlib.suppress(queue.Empty):
+                    return answers.get(timeout=_ANSWER_S)
+        finally:
+            self.remove_port_callback(CRTPPort.PLATFORM, take)
+        return ""
 
     def take_faults(self) -> list[str]:
         """What the driver complained of since the last call."""
@@ -125,7 +155,7 @@ class Session(Crazyflie):  # type: ignore[misc]  # cflib is untyped
             self.link.needs_resending = True
 
     def _note_failure(self, _uri: str, message: str) -> None:
-        self.failure = next(iter(message.splitlines()), "unknown error")
+        self.failure = next(iter(message.splitlines()), "unknown error").removeprefix("Couldn't load link driver: ")
 
     def _note_quality(self, percent: float) -> None:
         self.quality = percent / 100.0

@@ -14,6 +14,7 @@ from typer.exceptions import TyperException
 from lcd_flight.cli import (
     bench,
     collect,
+    doctor,
     evaluation,
     export,
     fly,
@@ -52,6 +53,7 @@ app.command("replay")(replay.replay)
 app.command("recover")(recover.recover)
 app.command("export")(export.export)
 app.command("monitor")(monitor.monitor)
+app.command("doctor")(doctor.doctor)
 app.command("bench")(bench.bench)
 app.add_typer(sim.app, name="sim")
 

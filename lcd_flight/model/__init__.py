@@ -8,6 +8,7 @@ from lcd_flight.model.plan import FlightPlan, Leg, LegKind
 from lcd_flight.model.ports import (
     Clock,
     ControlLaw,
+    Inspection,
     Link,
     LinkContext,
     Observer,
@@ -53,6 +54,7 @@ __all__ = [
     "Geofence",
     "GeometricGains",
     "InputError",
+    "Inspection",
     "IntArray",
     "LcdError",
     "Leg",

@@ -102,6 +102,19 @@ class Link(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True)
+class Inspection:
+    """What was found at the other end of a link, without changing anything there."""
+
+    description: str
+    facts: tuple[tuple[str, str], ...]
+    """What, and how it is, for a person."""
+    differences: tuple[str, ...] = ()
+    """What flying would change first."""
+    problems: tuple[str, ...] = ()
+    """What speaks against flying, with the remedy."""
+
+
 class PoseSource(Protocol):
     """Filtered pose of one rigid body."""
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import cast
 
-from lcd_flight.model import InputError, Link, LinkContext
+from lcd_flight.model import Clock, InputError, Inspection, Link, LinkContext
 from lcd_flight.plugins.entry_points import load, names
 
 
@@ -63,6 +63,18 @@ def open_link(uri: str, context: LinkContext) -> Link:
     for wrap, name in wrappers:
         link = wrap(link, parsed.options_of(name), context)
     return cast(Link, link)
+
+
+async def inspect_link(uri: str, clock: Clock) -> Inspection:
+    """Look at what is at the other end of a link, and change nothing there.
+
+    Raises:
+        InputError: unknown link or option, or a link that cannot be looked at.
+        RefusedError: nobody answers, or a package that it needs is not installed.
+    """
+    parsed = parse_uri(uri)
+    inspect = load("link_inspectors", parsed.link, "link to look at")
+    return cast(Inspection, await inspect(parsed.address, parsed.link_options(), clock))
 
 
 def _split_scheme(scheme: str) -> tuple[str, tuple[str, ...]]:

@@ -19,7 +19,7 @@ from lcd_flight.review.figures import figures_of
 from lcd_flight.review.kinematics import euler_deg, thrust_direction_error_rad
 from lcd_flight.review.page import path_panel
 from lcd_flight.review.plots import ANGLES, AXES, LEAST_ERROR_M, error_axis, error_rules
-from lcd_flight.review.space import space_of
+from lcd_flight.review.space import Space, space_of
 from lcd_flight.review.timeline import common_timeline, zero_s
 
 
@@ -41,18 +41,13 @@ def comparison(logs: Sequence[FlightLog]) -> Html:
         for number, (log, zero) in enumerate(zip(logs, zeros_s, strict=True))
     ]
     line, shown = common_timeline(logs), list(_panels(flights))
-    space = space_of(logs, zeros_s)
-    keys = [(flight.style, flight.name) for flight in flights] + [("reference", "reference")]
-    if space.fenced:
-        keys.append(("fence", "fence of flight 1"))
-    names = sorted({log.header.name for log in logs})
     content = [
-        tag("header", tag("h1", f"{len(logs)} flights"), tag("p", ", ".join(names))),
+        tag("header", tag("h1", f"{len(logs)} flights"), _names(flights)),
         *(sections.warnings(log, named=True) for log in logs),
         tag(
             "div",
             figures_table(flights),
-            path_panel(space, keys),
+            _path(flights, space_of(logs, zeros_s)),
             *(panel_html(panel, line) for panel in shown),
             differences_table(flights),
             findings_table(flights),
@@ -60,7 +55,21 @@ def comparison(logs: Sequence[FlightLog]) -> Html:
         ),
         tag("footer", "0 s: the begin of the first trajectory. The phases shown are those of flight 1."),
     ]
-    return document(f"{len(logs)} flights: {', '.join(names)}", content, shown, line)
+    missions = ", ".join(sorted({log.header.name for log in logs}))
+    return document(f"{len(logs)} flights: {missions}", content, shown, line)
+
+
+def _names(flights: Sequence[ComparedFlight]) -> Html:
+    """Which number and colour is which flight."""
+    rows = (tag("span", tag("i", class_=f"key {flight.style}"), flight.name) for flight in flights)
+    return tag("p", *rows, class_="keys")
+
+
+def _path(flights: Sequence[ComparedFlight], space: Space) -> Html:
+    keys = [(flight.style, str(flight.number + 1)) for flight in flights] + [("reference", "reference")]
+    if space.fenced:
+        keys.append(("fence", "fence of flight 1"))
+    return path_panel(space, keys)
 
 
 def _panels(flights: Sequence[ComparedFlight]) -> Iterator[Panel]:

@@ -137,8 +137,8 @@ def _times(log: FlightLog, code: str) -> str:
 
 
 def _table(flights: Sequence[ComparedFlight], rows: Iterable[Html]) -> Html:
-    heads = [tag("th", tag("i", class_=f"key {flight.style}"), flight.name) for flight in flights]
-    return tag("div", tag("table", tag("tr", tag("th", ""), *heads), *rows), class_="scroll")
+    heads = [tag("th", tag("i", class_=f"key {flight.style}"), str(flight.number + 1)) for flight in flights]
+    return tag("div", tag("table", tag("tr", tag("th", ""), *heads), *rows, class_="compared"), class_="scroll")
 
 
 def _row(name: str, cells: Sequence[str]) -> Html:

@@ -15,7 +15,7 @@ _POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inl
 """Nothing is ever loaded, whatever a log may hold."""
 
 _STYLES = ("space.css", "page.css", "chart.css", "player.css")
-_SCRIPTS = ("time.js", "samples.js", "charts.js", "gestures.js", "space.js", "player.js")
+_SCRIPTS = ("time.js", "samples.js", "scale.js", "charts.js", "gestures.js", "space.js", "player.js")
 """One after another in one scope, each on those before it."""
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from lcd_flight.drawing.html import Html, tag
+from lcd_flight.drawing.html import Html, joined, tag
 from lcd_flight.drawing.scale import MINUS
 from lcd_flight.model import Outcome, Severity
 from lcd_flight.record import FlightLog
@@ -35,10 +35,13 @@ def heading(log: FlightLog, figures: FlightFigures) -> Html:
 
 def warnings(log: FlightLog, *, named: bool = False) -> Html:
     """What the reader must know before believing the rest; `named`: of which log."""
-    if log.complete:
-        return Html("")
     which = log.path.name if named else "This log"
-    return tag("p", f"{which} was cut: the last moments before the cut may be missing.", class_="alert")
+    words = []
+    if not log.complete:
+        words.append(f"{which} was cut: the last moments before the cut may be missing.")
+    if log.missing_ticks:
+        words.append(f"{which} lacks {log.missing_ticks} ticks within: there was no room to log them, or it is damaged.")
+    return joined(tag("p", text, class_="alert") for text in words)
 
 
 def tiles(figures: FlightFigures) -> Html:

@@ -42,7 +42,7 @@ class Rows(HTMLParser):
 
 def rows_of(html: str) -> dict[str, list[str]]:
     parser = Rows()
-    parser.feed(" ".join(re.findall(r"<table>.*?</table>", html, re.DOTALL)))
+    parser.feed(" ".join(re.findall(r"<table[^>]*>.*?</table>", html, re.DOTALL)))
     return {row[0]: row[1:] for row in parser.rows}
 
 

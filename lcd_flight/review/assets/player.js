@@ -111,7 +111,7 @@ function showNames() {
 
 follow(() => {
   slider.value = instant;
-  clock.textContent = `${instant.toFixed(2)} s`;
+  clock.textContent = `${instant.toFixed(2).replace("-", "−")} s`;
   stripWindow.style.left = `${100 * shareOfWhole(shown.begin)}%`;
   stripWindow.style.width = `${100 * (shareOfWhole(shown.end) - shareOfWhole(shown.begin))}%`;
   stripWindow.hidden = !zoomed();

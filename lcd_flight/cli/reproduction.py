@@ -40,9 +40,9 @@ def reproduce(
     Run again after an interruption, it goes on where it stopped.
     """
     from lcd_flight import plugins
-    from lcd_flight.learning.experiments import COUNT, QUICK_COUNT, ReproduceSettings
     from lcd_flight.learning.freshness import about_seed, seed_of
     from lcd_flight.learning.reproduce import reproduce as reproduce_all
+    from lcd_flight.learning.reproduction_settings import COUNT, QUICK_COUNT, ReproduceSettings
     from lcd_flight.learning.results_page import write_results
 
     if models not in ("train", "shipped"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from lcd_flight.model.rollout import CRASH_ERROR_M
 
 _WIDTH = 900.0
 _ROW = 27.0
+_NAMES = 220.0
+"""Room for the rows' names."""
 _ERRORS = Axis(0.02, 20.0, log=True)
 _QUANTILES = 200
 _FAMILIES = (("minimum-snap", "b"), ("analytic", "c"), ("learned", "a"), ("search", "d"))
@@ -35,24 +37,31 @@ def strokes(methods: Sequence[str]) -> dict[str, Stroke]:
 
 def crash_rate_figure(title: str, evaluation: Evaluation) -> Html:
     """A bar for each method over all drag configurations, with its 95 % interval, and a dot for each configuration."""
-    table, drags = evaluation.methods, evaluation.options.drags
-    by_drag = [evaluation.at(drag) for drag in drags]
-    most = max(row.crash_rate_high for row in table.values())
+    drags = evaluation.options.drags
+    by_drag = [evaluation.at(drag) for drag in drags] if len(drags) > 1 else []
+    dots = {name: [figures[name].crash_rate for figures in by_drag] for name in evaluation.runs}
+    note = f"bar: all {len(drags)} drag configurations, with 95 % interval; dots: each of them" if by_drag else ""
+    return bar_figure(title, evaluation.methods, dots, note)
+
+
+def bar_figure(
+    title: str, table: Mapping[str, MethodFigures], dots: Mapping[str, Sequence[float]] | None = None, note: str = ""
+) -> Html:
+    """A bar for each row of a table with its 95 % interval.
+
+    dots: crash rates in % that a row is made of.
+    """
     height = _ROW * len(table)
-    panel = Panel(190.0, 52.0, 520.0, height, Axis(0.0, max(1.05 * most, 1.0)), Axis(0.0, float(len(table))))
-    parts = [words(24.0, 26.0, title, "title")]
-    parts += panel.frame("", "crashes in % of flights", ticks=(8, 0))
+    most = max(row.crash_rate_high for row in table.values())
+    panel = Panel(_NAMES, 52.0, 500.0, height, Axis(0.0, max(1.05 * most, 1.0)), Axis(0.0, float(len(table))))
+    parts = [words(24.0, 26.0, title, "title"), *panel.frame("", "crashes in % of flights", ticks=(8, 0))]
     for number, (name, row) in enumerate(table.items()):
-        rates = [figures[name].crash_rate for figures in by_drag]
-        parts += _bar(panel, len(table) - 0.5 - number, name, row, rates)
-    note = (
-        f"bar: all {len(drags)} drag configurations, with 95 % interval; dots: each of them" if len(drags) > 1 else ""
-    )
-    parts.append(words(190.0, 52.0 + height + 58.0, note, "muted small"))
+        parts += _bar(panel, len(table) - 0.5 - number, name, row, dots[name] if dots else ())
+    parts.append(words(_NAMES, 52.0 + height + 58.0, note, "muted small"))
     return document(_WIDTH, height + 124.0, parts, f"{title}: crash rates of {', '.join(table)}")
 
 
-def _bar(panel: Panel, up: float, name: str, row: MethodFigures, rates: list[float]) -> list[Html]:
+def _bar(panel: Panel, up: float, name: str, row: MethodFigures, dots: Sequence[float]) -> list[Html]:
     """One method's row: name, bar, interval, dots and the number."""
     stroke = strokes([name])[name]
     ((left, y), (right, _)) = panel.at(np.array([0.0, row.crash_rate]), np.array([up, up])).tolist()
@@ -63,9 +72,7 @@ def _bar(panel: Panel, up: float, name: str, row: MethodFigures, rates: list[flo
         panel.line(np.array([row.crash_rate_low, row.crash_rate_high]), np.array([up, up]), Stroke("ink", width=1.2)),
         words(panel.left + panel.width + 14.0, y + 4.5, _number(row), "small"),
     ]
-    if len(rates) > 1:
-        parts += panel.dots(np.array(rates), np.full(len(rates), up), stroke, 2.6)
-    return parts
+    return parts + panel.dots(np.array(dots), np.full(len(dots), up), stroke, 2.6)
 
 
 def _number(row: MethodFigures) -> str:

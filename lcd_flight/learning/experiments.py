@@ -1,4 +1,4 @@
-"""What `lcd reproduce` trains and flies: the paper's experiment in three worlds, and what goes beyond it."""
+"""What `lcd reproduce` flies: the paper's experiment in three worlds, what explains it, and what goes beyond it."""
 
 from __future__ import annotations
 
@@ -6,75 +6,18 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
 from lcd_flight.learning.evaluation import EvaluationOptions
-from lcd_flight.learning.methods import METHODS, shipped_model
-from lcd_flight.learning.recipes import RECIPES, TrainConfig
-from lcd_flight.model import InputError, World
+from lcd_flight.learning.methods import METHODS, baseline_model, shipped_model
+from lcd_flight.learning.reproduction_models import BASELINES, LESSON_WORLD, LESSONS
+from lcd_flight.learning.reproduction_settings import MIDDLE_DRAG, WORLDS, ReproduceSettings, paper_worlds
+from lcd_flight.model import World
 from lcd_flight.planning.cost.model_file import model_names
 from lcd_flight.planning.planner import Timing
 from lcd_flight.worlds import load_world
 
-WORLDS = ("crazyflie-paper", "crazyflie-saturated", "hummingbird-paper")
-"""The paper's setting as written, the same where minimum snap crashes as often as reported, the released code's."""
-DRAGS = (1, 2, 3, 4, 5)
-MIDDLE_DRAG = 3
-COUNT, QUICK_COUNT = 1000, 4
-"""Tasks of each world, unless said otherwise."""
-_NOISE_SEEDS = 3
 TIMINGS: tuple[Timing, ...] = ("fixed", "retimed")
 
-Models: TypeAlias = Literal["train", "shipped"]
-Group: TypeAlias = Literal["paper", "probe", "beyond", "shipped"]
-"""`probe`: minimum snap in changed worlds, for what decides its crash rate."""
-
-
-@dataclass(frozen=True, slots=True)
-class ReproduceSettings:
-    """What is reproduced, and how large."""
-
-    seed: int
-    """Of tasks and noise."""
-    count: int = COUNT
-    """Tasks of each world."""
-    noise_seeds: int = _NOISE_SEEDS
-    recipe: str = "medium"
-    """How the models are trained, by name (`recipes.py`)."""
-    per_drag: bool = False
-    """One model for each drag configuration, as the paper has them, in place of one over all."""
-    models: Models = "train"
-    """`shipped` evaluates the models that ship and trains nothing."""
-    quick: bool = False
-    """A tiny run of every step, for tests: its figures mean nothing."""
-
-    @property
-    def drags(self) -> tuple[int, ...]:
-        """Configurations that the paper's experiment is flown in."""
-        return (MIDDLE_DRAG,) if self.quick else DRAGS
-
-    @property
-    def command(self) -> str:
-        """The command line that makes the same again."""
-        words = {
-            f"--count {self.count}": self.count != (QUICK_COUNT if self.quick else COUNT),
-            f"--noise-seeds {self.noise_seeds}": self.noise_seeds != _NOISE_SEEDS,
-            f"--recipe {self.recipe}": self.models == "train",
-            "--models shipped": self.models == "shipped",
-            "--per-drag": self.per_drag,
-            "--quick": self.quick,
-        }
-        return " ".join(["lcd reproduce", *(word for word, said in words.items() if said)])
-
-    def __post_init__(self) -> None:
-        """Check before hours are spent.
-
-        Raises:
-            InputError: no such recipe, or counts that are not positive.
-        """
-        if self.recipe not in RECIPES:
-            raise InputError(f"recipe {self.recipe}: choose one of {', '.join(RECIPES)}")
-        if self.count < 2 or self.noise_seeds < 1:
-            raise InputError(f"{self.count} tasks x {self.noise_seeds} noise seeds: give at least 2 tasks and 1 seed")
-        if self.per_drag and self.models == "shipped":
-            raise InputError("one model for each drag configuration does not ship: leave out --per-drag or train")
+Group: TypeAlias = Literal["paper", "probe", "lesson", "beyond", "shipped"]
+"""`probe`: minimum snap in changed worlds, for what decides its crash rate. `lesson`: models made otherwise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,39 +34,14 @@ class Experiment:
     options: EvaluationOptions
     trained: bool
     """Whether its model is one that this run has trained; else it ships."""
+    recipe: str = ""
+    """Of the model that this run has trained, where it is not the run's own."""
 
 
 def experiments(settings: ReproduceSettings) -> list[Experiment]:
     """All of them, the paper's first."""
-    return [*_paper(settings), *_probes(settings), *_beyond(settings), *_shipped(settings)]
-
-
-def trainings(settings: ReproduceSettings) -> list[TrainConfig]:
-    """The models to train: one for the worlds of each vehicle, over all drag configurations or one for each."""
-    if settings.models == "shipped":
-        return []
-    by_model: dict[str, list[World]] = {}
-    for world in _worlds():
-        by_model.setdefault(shipped_model(world), []).append(world)
-    groups = [(drag,) for drag in DRAGS] if settings.per_drag else [DRAGS]
-    return [_training(settings, tuple(worlds), drags) for worlds in by_model.values() for drags in groups]
-
-
-def model_name(world: World, drags: tuple[int, ...]) -> str:
-    """Of a model that is trained over these drag configurations, for a world's vehicle and loop."""
-    return shipped_model(world) + ("" if drags == DRAGS else f"-drag-{drags[0]}")
-
-
-def _worlds() -> list[World]:
-    return [load_world(name) for name in WORLDS]
-
-
-def _training(settings: ReproduceSettings, worlds: tuple[World, ...], drags: tuple[int, ...]) -> TrainConfig:
-    recipe = replace(RECIPES[settings.recipe](model_name(worlds[0], drags), worlds), drags=drags)
-    if not settings.quick:
-        return recipe
-    mix, fit = replace(recipe.mix, shard_rows=4096), replace(recipe.fit, epochs=1)
-    return replace(recipe, count=4096, rounds=1, policy_tasks=32, members=1, mix=mix, fit=fit)
+    paper = _paper(settings)
+    return [*paper, *_probes(settings), *_lessons(settings, paper), *_beyond(paper), *_shipped(settings, paper)]
 
 
 def _paper(settings: ReproduceSettings) -> list[Experiment]:
@@ -134,18 +52,28 @@ def _paper(settings: ReproduceSettings) -> list[Experiment]:
             title="",
             group="paper",
             world=world,
-            methods=tuple(METHODS),
+            methods=_methods(settings, world),
             options=EvaluationOptions(settings.seed, timing, settings.drags, settings.noise_seeds),
             trained=settings.models == "train",
         )
-        for world in _worlds()
+        for world in paper_worlds()
         for timing in TIMINGS
     ]
 
 
+def _methods(settings: ReproduceSettings, world: World) -> tuple[str, ...]:
+    """All there are; of the baselines with a model of their own, those whose model is to be had."""
+    missing = {
+        name
+        for name, recipe in BASELINES.items()
+        if settings.models == "shipped" and baseline_model(shipped_model(world), recipe) not in model_names()
+    }
+    return tuple(name for name in METHODS if name not in missing)
+
+
 def _probes(settings: ReproduceSettings) -> list[Experiment]:
     """Minimum snap in worlds that differ in one thing each: why crash rates disagree."""
-    paper, saturated, hummingbird = _worlds()
+    paper, saturated, hummingbird = paper_worlds()
     slow_motors = replace(paper.base_vehicle, motor_time_constant_s=0.072)
     quiet = replace(paper.base_vehicle, motor_noise=0.0)
     boundless = replace(saturated.base_vehicle, rotor_speed_max=4.0 * saturated.base_vehicle.rotor_speed_max)
@@ -165,9 +93,29 @@ def _probes(settings: ReproduceSettings) -> list[Experiment]:
     ]
 
 
-def _beyond(settings: ReproduceSettings) -> list[Experiment]:
+def _lessons(settings: ReproduceSettings, paper: list[Experiment]) -> list[Experiment]:
+    """The learned method with models that were made otherwise."""
+    if settings.models == "shipped":
+        return []
+    return [
+        replace(
+            experiment,
+            name=f"{experiment.name}-{recipe}",
+            title=recipe,
+            group="lesson",
+            methods=("learned",),
+            options=_middle(experiment),
+            recipe=recipe,
+        )
+        for experiment in paper
+        if experiment.world.name == LESSON_WORLD
+        for recipe in LESSONS
+    ]
+
+
+def _beyond(paper: list[Experiment]) -> list[Experiment]:
     """Longer tasks, a weaker vehicle than planned for, yaw by the short way, and the flight loop."""
-    base = {e.name: replace(e, group="beyond", options=_middle(e)) for e in _paper(settings)}
+    base = {e.name: replace(e, group="beyond", options=_middle(e)) for e in paper}
     longer = [_with_waypoints(base[f"crazyflie-saturated-{timing}"], 10) for timing in TIMINGS]
     weaker = [
         _varied(base[f"{name}-retimed"], "thrust 5 % lower than planned for", thrust_share=0.95) for name in WORLDS
@@ -177,7 +125,7 @@ def _beyond(settings: ReproduceSettings) -> list[Experiment]:
     return [*longer, *weaker, *shorter, *flight]
 
 
-def _shipped(settings: ReproduceSettings) -> list[Experiment]:
+def _shipped(settings: ReproduceSettings, paper: list[Experiment]) -> list[Experiment]:
     """The models that ship, beside those that this run has trained."""
     if settings.models == "shipped":
         return []
@@ -191,7 +139,7 @@ def _shipped(settings: ReproduceSettings) -> list[Experiment]:
             options=_middle(experiment),
             trained=False,
         )
-        for experiment in _paper(settings)
+        for experiment in paper
         if shipped_model(experiment.world) in model_names()
     ]
 
@@ -213,6 +161,7 @@ def _with_waypoints(base: Experiment, waypoints: int) -> Experiment:
         base,
         name=f"{base.name}-{waypoints}-waypoints",
         title=f"{waypoints} waypoints",
+        methods=_without_baselines(base),
         world=replace(base.world, sampler=sampler),
     )
 
@@ -220,4 +169,16 @@ def _with_waypoints(base: Experiment, waypoints: int) -> Experiment:
 def _in_flight_loop(base: Experiment) -> Experiment:
     """The flight loop, which the paper's hardware has and its simulation has not; its model ships."""
     world = load_world("crazyflie-flight")
-    return replace(base, name=f"{world.name}-{base.options.timing}", title="flight loop", world=world, trained=False)
+    return replace(
+        base,
+        name=f"{world.name}-{base.options.timing}",
+        title="flight loop",
+        methods=_without_baselines(base),
+        world=world,
+        trained=False,
+    )
+
+
+def _without_baselines(base: Experiment) -> tuple[str, ...]:
+    """Its methods but those whose models serve the paper's tasks alone."""
+    return tuple(name for name in base.methods if name not in BASELINES)

@@ -16,19 +16,13 @@ from typing import TypeAlias
 from lcd_flight.learning.evaluate import evaluate, tasks_of
 from lcd_flight.learning.evaluation import Evaluation, EvaluationOptions
 from lcd_flight.learning.evaluation_files import Parts
-from lcd_flight.learning.experiments import (
-    DRAGS,
-    Experiment,
-    Group,
-    ReproduceSettings,
-    experiments,
-    model_name,
-    trainings,
-)
+from lcd_flight.learning.experiments import Experiment, Group, experiments
 from lcd_flight.learning.progress import Progress, ProgressCallback
 from lcd_flight.learning.recipes import TrainConfig
+from lcd_flight.learning.reproduction_models import model_name, trainings
+from lcd_flight.learning.reproduction_settings import DRAGS, ReproduceSettings
 from lcd_flight.learning.train import train
-from lcd_flight.model import Simulator, World
+from lcd_flight.model import Simulator
 from lcd_flight.planning.cost.model_file import SUFFIX
 
 _SECONDS_PER_ROLLOUT = 4.0e-5
@@ -103,29 +97,29 @@ class _Shop:
 
     def train(self, config: TrainConfig, report: ProgressCallback) -> None:
         """Make a model, or find it made."""
-        folder = self.work / "training" / f"{config.name}-{self.settings.recipe}"
-        train(config, folder, self._model_path(config.name), self.simulator, report)
+        folder = self.work / "training" / config.name
+        train(config, folder, self._path(config.name), self.simulator, report)
 
     def evaluate(self, experiment: Experiment, report: ProgressCallback) -> Evaluation:
         """Fly one table; drag by drag where each configuration has a model of its own."""
         options = experiment.options
         if not experiment.trained:
             return self._flown(experiment, options, report)
-        if not self.settings.per_drag:
-            return self._flown(experiment, replace(options, model=self._model(experiment.world, DRAGS)), report)
-        single = [replace(options, drags=(d,), model=self._model(experiment.world, (d,))) for d in options.drags]
+        if not self.settings.per_drag or experiment.recipe:
+            return self._flown(experiment, replace(options, model=self._model(experiment, DRAGS)), report)
+        single = [replace(options, drags=(d,), model=self._model(experiment, (d,))) for d in options.drags]
         return Evaluation.beside([self._flown(experiment, o, report) for o in single])
+
+    def _model(self, experiment: Experiment, drags: tuple[int, ...]) -> str:
+        return str(self._path(model_name(self.settings, experiment.world, drags, experiment.recipe)))
+
+    def _path(self, name: str) -> Path:
+        return self.work / "models" / f"{name}{SUFFIX}"
 
     def _flown(self, experiment: Experiment, options: EvaluationOptions, report: ProgressCallback) -> Evaluation:
         tasks = tasks_of(experiment.world, self.settings.count, options)
         parts = Parts.of(self.work / "flights", experiment.world, tasks, options, self.simulator)
         return evaluate(experiment.world, experiment.methods, tasks, self.simulator, options, report, parts)
-
-    def _model(self, world: World, drags: tuple[int, ...]) -> str:
-        return str(self._model_path(model_name(world, drags)))
-
-    def _model_path(self, name: str) -> Path:
-        return self.work / "models" / f"{name}-{self.settings.recipe}{SUFFIX}"
 
 
 class _Clock:

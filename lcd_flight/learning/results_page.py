@@ -16,13 +16,14 @@ from pathlib import Path
 from typing import Any
 
 from lcd_flight.learning import results_tables as tables
-from lcd_flight.learning.evaluation_figures import crash_rate_figure, error_figure
-from lcd_flight.learning.experiments import MIDDLE_DRAG
+from lcd_flight.learning.evaluation_figures import bar_figure, crash_rate_figure, error_figure
 from lcd_flight.learning.files import write_text
 from lcd_flight.learning.fingerprint import versions
 from lcd_flight.learning.flight_figures import PathTeller
 from lcd_flight.learning.freshness import about_seed
 from lcd_flight.learning.reproduce import Reproduction
+from lcd_flight.learning.reproduction_models import LESSON_WORLD
+from lcd_flight.learning.reproduction_settings import MIDDLE_DRAG
 from lcd_flight.learning.results_flights import write_flights
 from lcd_flight.model import Simulator
 
@@ -43,6 +44,9 @@ def write_results(result: Reproduction, folder: Path, simulator: Simulator) -> P
         title = f"{experiment.world.name}, {tables.TIMING_WORDS[experiment.options.timing]}"
         write_text(folder / f"crash-rates-{experiment.name}.svg", crash_rate_figure(title, evaluation))
         write_text(folder / f"errors-{experiment.name}.svg", error_figure(title, evaluation))
+    for timing, rows in tables.lesson_rows(result).items():
+        title = f"{LESSON_WORLD}, {tables.TIMING_WORDS[timing]}: what a model was made from"
+        write_text(folder / f"lesson-{timing}.svg", bar_figure(title, rows))
     flights = write_flights(result, folder, simulator, simulator) if isinstance(simulator, PathTeller) else []
     write_text(folder / "results.json", json.dumps(_rounded(_as_json(result)), separators=(",", ":")) + "\n")
     write_text(folder / "README.md", page(result, flights))
@@ -103,6 +107,7 @@ def _values(result: Reproduction) -> dict[str, str]:
         "models": trained if settings.models == "train" else "those that ship",
         "middle_drag": str(MIDDLE_DRAG),
         "drags": str(len(settings.drags)),
+        "lesson_figures": "\n\n".join(f"![Models, {t}](lesson-{t}.svg)" for t in tables.lesson_rows(result)),
     }
 
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 
 from lcd_flight.learning.evaluation import Evaluation, MethodFigures
-from lcd_flight.learning.experiments import MIDDLE_DRAG, TIMINGS, WORLDS
+from lcd_flight.learning.experiments import TIMINGS
 from lcd_flight.learning.reproduce import Reproduction
+from lcd_flight.learning.reproduction_models import LESSON_WORLD
+from lcd_flight.learning.reproduction_settings import MIDDLE_DRAG, WORLDS
 
 PAIRS = (
     ("learned", "minimum-snap"),
@@ -118,6 +120,36 @@ def shipped(result: Reproduction) -> str:
             rows.append([where, f"`{name}`", rate(ours[name]), rate(row)])
     words = "The models that ship, made by a larger recipe than this run's:\n\n"
     return words + table(["experiment", "method", "trained here", "as shipped"], rows)
+
+
+LESSON_WORDS = {
+    "optima-only": "learned, from minimum-snap optima alone",
+    "convex": "learned, input-convex on 39 knot numbers",
+}
+
+
+def lesson_rows(result: Reproduction) -> dict[str, dict[str, MethodFigures]]:
+    """For each timing, minimum snap and what the learned method makes of models from other data and networks."""
+    found: dict[str, dict[str, MethodFigures]] = {}
+    for experiment in result.in_group("lesson"):
+        ours = result.evaluations[f"{experiment.world.name}-{experiment.options.timing}"].at(MIDDLE_DRAG)
+        rows = found.setdefault(experiment.options.timing, {"minimum-snap": ours["minimum-snap"]})
+        rows[LESSON_WORDS[experiment.title]] = result.evaluations[experiment.name].methods["learned"]
+    for timing, rows in found.items():
+        ours = result.evaluations[f"{LESSON_WORLD}-{timing}"].at(MIDDLE_DRAG)
+        rows["mlp-knots"] = ours["mlp-knots"]
+        rows["learned, as above"] = ours["learned"]
+    return found
+
+
+def lessons(result: Reproduction) -> str:
+    """What the learned method makes of models from other data and networks."""
+    found = lesson_rows(result)
+    if not found:
+        return "Not part of a run with the models that ship."
+    names = list(next(iter(found.values())))
+    head = ["model", *(TIMING_WORDS[timing] for timing in found)]
+    return table(head, [[name, *(rate(rows[name]) for rows in found.values())] for name in names])
 
 
 def comparisons(result: Reproduction) -> str:

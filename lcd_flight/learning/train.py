@@ -41,7 +41,7 @@ _TEST_PLANS = 16
 
 def train(
     config: TrainConfig, work: Path, out: Path, simulator: Simulator, progress: ProgressCallback = ignore
-) -> CostModel:
+) -> ModelCard:
     """Train a model and write it to `out` (`*.safetensors`); data and the models of the rounds stay in `work`.
 
     Raises:
@@ -55,7 +55,8 @@ def train(
     for number in range(1, config.rounds + 1):
         model = training.next_model(number)
     _copy(training.model_path(config.rounds), out)
-    return model
+    assert model.card is not None  # noqa: S101 - a saved model has one
+    return model.card
 
 
 class _Training:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import inspect
+import os
 import shutil
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +17,7 @@ import numpy as np
 from lcd_flight.learning.evaluation_files import hash_of_tasks
 from lcd_flight.learning.fingerprint import described, fingerprint, versions
 from lcd_flight.learning.freshness import hash_of_files
-from lcd_flight.learning.methods import Problem, find_method, shipped_model
+from lcd_flight.learning.methods import Method, Problem, find_method, shipped_model
 from lcd_flight.learning.plan_files import PlannedTasks, load_plans, save_plans
 from lcd_flight.learning.progress import Meter, ProgressCallback, ignore
 from lcd_flight.mission.airframe import top_speed_m_per_s
@@ -24,8 +26,8 @@ from lcd_flight.planning.cost.model_file import MODELS, SUFFIX
 from lcd_flight.planning.planner import Timing
 from lcd_flight.worlds import fingerprint as vehicle_fingerprint
 
-_BLOCK_SEGMENTS = 3000
-"""Planned between two reports and two savings: seconds at most."""
+_BLOCK_SEGMENTS = 600
+"""Planned between two reports and two savings: a second or two."""
 _HOUSE = Path(__file__).parents[1]
 
 
@@ -80,19 +82,37 @@ def plan_tasks(
     method, problem = find_method(planning.method), _problem(tasks, planning, simulator)
     about = _about(planning, problem)
     folder = out.with_name(f".{out.name}.blocks") / fingerprint({**about, "tasks": hash_of_tasks(tasks)})
-    meter = Meter(progress, len(tasks), "tasks")
-    parts = []
-    for number, rows in enumerate(_blocks(tasks)):
-        kept = folder / f"{number:05d}.npz"
-        if not kept.exists():
-            planned = method(problem.take(rows))
-            save_plans(kept, PlannedTasks(planned.plans, planned.fell_back))
-        parts.append(load_plans(kept))
-        meter.advance(len(rows), planning.method)
-    plans = _joined(parts, about)
+    method(problem.take(np.arange(1)))  # says what is missing before any work, and loads the kernels once
+    plans = _joined(_planned(method, problem, folder, Meter(progress, len(tasks), "tasks")), about)
     save_plans(out, plans)
     shutil.rmtree(folder.parent, ignore_errors=True)
     return plans
+
+
+def _planned(method: Method, problem: Problem, folder: Path, meter: Meter) -> list[PlannedTasks]:
+    """All blocks, side by side on all cores; a task's plan does not depend on its block."""
+    parts = []
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        work = [
+            pool.submit(_block, method, problem.take(rows), folder / f"{number:05d}.npz")
+            for number, rows in enumerate(_blocks(problem.tasks))
+        ]
+        try:
+            for block in work:
+                parts.append(block.result())
+                meter.advance(len(parts[-1]))
+        except BaseException:  # above all KeyboardInterrupt: what has not begun is not planned any more
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
+    return parts
+
+
+def _block(method: Method, problem: Problem, kept: Path) -> PlannedTasks:
+    """One block: from an earlier run, or planned and kept."""
+    if not kept.exists():
+        planned = method(problem)
+        save_plans(kept, PlannedTasks(planned.plans, planned.fell_back))
+    return load_plans(kept)
 
 
 def _problem(tasks: Tasks, planning: TaskPlanning, simulator: Simulator) -> Problem:

@@ -121,6 +121,11 @@ def analytic(problem: Problem) -> Planned:
     return _solved(_solve_analytic(problem))
 
 
+def analytic_long(problem: Problem) -> Planned:
+    """The same with ten times the iterations: no less processor time than `learned` takes."""
+    return _solved(_solve(problem, ThrustProxy(), PlannerOptions(problem.timing, iterations=400)))
+
+
 def learned(problem: Problem) -> Planned:
     """The projected solve on the learned cost: no simulator.
 
@@ -198,6 +203,7 @@ METHODS: dict[str, Method] = {
     "paper": paper,
     "mlp-knots": mlp_knots,
     "analytic": analytic,
+    "analytic-long": analytic_long,
     "learned": learned,
     "analytic-polished": analytic_polished,
     "learned-polished": learned_polished,

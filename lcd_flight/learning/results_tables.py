@@ -13,6 +13,7 @@ from lcd_flight.learning.reproduction_settings import MIDDLE_DRAG, WORLDS
 PAIRS = (
     ("learned", "minimum-snap"),
     ("learned", "analytic"),
+    ("learned", "analytic-long"),
     ("learned-polished", "analytic-polished"),
     ("learned-polished", "search"),
 )

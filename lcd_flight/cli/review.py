@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,7 +12,7 @@ from lcd_flight.cli.terminal import Terminal
 from lcd_flight.errors import InputError, Outcome
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from lcd_flight.record import FlightLog
 
@@ -34,12 +33,12 @@ def review(
 ) -> int:
     """Write the review page of a flight and show its figures of merit; of several flights, compare them."""
     terminal = Terminal(json_line=json, quiet=quiet, color=not no_color)
-    flights = [_read(path) for path in logs]
+    flights = [_read(terminal, path) for path in logs]
     _write_others(terminal, flights, {"picture": picture, "csv": csv, "parquet": parquet, "rerun": rerun})
     return _review(terminal, flights[0], out) if len(flights) == 1 else _compare(terminal, flights, out)
 
 
-def _read(path: Path) -> FlightLog:
+def _read(terminal: Terminal, path: Path) -> FlightLog:
     """The log.
 
     Raises:
@@ -53,14 +52,16 @@ def _read(path: Path) -> FlightLog:
         remedy = f"the newest log in {folder} is {newest[-1]}" if newest else "`lcd-fly` writes them into flights/"
         what = "is a folder" if path.is_dir() else "no such file"
         raise InputError(f"{path}: {what}; give the .mcap file of a flight: {remedy}")
+    terminal.status(f"reading {path}, {path.stat().st_size / 1e6:.1f} MB")
     return read_log(path)
 
 
 def _review(terminal: Terminal, flight: FlightLog, out: Path | None) -> int:
-    from lcd_flight.review import figures_of, write_page
+    from lcd_flight.review import write_page
 
-    figures = figures_of(flight).to_json()
-    page = _written(out or flight.path.with_suffix(".html"), partial(write_page, flight))
+    terminal.status("measuring and drawing")
+    figures = _figures(flight)
+    page = write_page(flight, out or flight.path.with_suffix(".html"))
     terminal.line("REVIEW", str(page))
     for key, value in figures.items():
         if key not in _TABLES:
@@ -69,11 +70,12 @@ def _review(terminal: Terminal, flight: FlightLog, out: Path | None) -> int:
 
 
 def _compare(terminal: Terminal, flights: Sequence[FlightLog], out: Path | None) -> int:
-    from lcd_flight.review import figures_of, write_comparison
+    from lcd_flight.review import write_comparison
 
     default = flights[0].path.with_name(f"{flights[0].path.stem}_and_{len(flights) - 1}_more.html")
-    page = _written(out or default, partial(write_comparison, flights))
-    figures = [figures_of(flight).to_json() for flight in flights]
+    terminal.status("measuring and drawing")
+    page = write_comparison(flights, out or default)
+    figures = [_figures(flight) for flight in flights]
     terminal.line("COMPARE", str(page))
     for number, flight in enumerate(flights, start=1):
         terminal.detail(f"{number}: {flight.path}")
@@ -99,21 +101,17 @@ def _write_others(terminal: Terminal, flights: Sequence[FlightLog], wanted: dict
             continue
         if len(flights) > 1:
             raise InputError(f"--{name} {path}: is one file, {len(flights)} logs were given; review them one by one")
-        _written(path, partial(writers[name], flights[0]))
+        terminal.status(f"writing {path}")
+        writers[name](flights[0], path)
         terminal.line(name.upper(), str(path))
 
 
-def _written(path: Path, write: Callable[[Path], Any]) -> Path:
-    """Write a file.
+def _figures(flight: FlightLog) -> dict[str, Any]:
+    """As JSON; how the flight ended is `flight_outcome`, because `outcome` is how the review did."""
+    from lcd_flight.review import figures_of
 
-    Raises:
-        InputError: it cannot be written.
-    """
-    try:
-        write(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}; choose another place") from error
-    return path
+    figures = figures_of(flight).to_json()
+    return {"flight_outcome": figures.pop("outcome"), **figures}
 
 
 def _text(value: object) -> str:

@@ -79,6 +79,8 @@ class Timeline:
     axis: Axis
     phases: Sequence[Band]
     flags: Sequence[Flag]
+    gaps: Sequence[Band] = ()
+    """Where the log lacks ticks."""
 
     def across(self, time_s: float) -> float:
         """Share of the width."""
@@ -139,7 +141,7 @@ def _chart(chart: Chart, timeline: Timeline, *, first: bool) -> Html:
     rules = [rule for rule in chart.rules if axis.low <= rule.value <= axis.high]
     drawing = tag(
         "svg",
-        *(_band(band, timeline) for band in (*timeline.phases, *chart.bands)),
+        *(_band(band, timeline) for band in (*timeline.phases, *timeline.gaps, *chart.bands)),
         tag("g", *(_level(axis, value, None) for value in ticks), class_="grid"),
         *(_flag(flag, timeline) for flag in timeline.flags),
         *(_level(axis, rule.value, f"rule {rule.style}") for rule in rules),

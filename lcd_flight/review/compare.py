@@ -9,6 +9,7 @@ import numpy as np
 
 from lcd_flight.drawing.html import Html, tag
 from lcd_flight.drawing.scale import Axis, axis_around
+from lcd_flight.mission.whole_file import write_whole
 from lcd_flight.model.types import FloatArray
 from lcd_flight.record import FlightLog
 from lcd_flight.review import sections
@@ -27,9 +28,9 @@ def write_comparison(logs: Sequence[FlightLog], path: Path) -> Path:
     """Write one page of several flights and return its path.
 
     Raises:
-        OSError: the file cannot be written.
+        InputError: the file cannot be written.
     """
-    path.write_text(comparison(logs), encoding="utf-8")
+    write_whole(path, comparison(logs))
     return path
 
 

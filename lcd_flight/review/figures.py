@@ -45,6 +45,8 @@ class FlightFigures:
     """Over the mission's trajectories: not take-off, holds, ways between and landing."""
     max_position_error_m: float | None
     """Over the mission's trajectories."""
+    max_position_error_time_s: float | None
+    """When that was, since the first tick."""
     overall_rmse_m: float | None
     """Over all ticks in the air."""
     overall_max_error_m: float | None
@@ -101,6 +103,7 @@ def figures_of(log: FlightLog) -> FlightFigures:
         duration_s=float(series.dt_s[flying].sum()),
         position_rmse_m=_rms(error_m[on_track]),
         max_position_error_m=_largest(error_m[on_track]),
+        max_position_error_time_s=_time_of_largest(series, np.where(on_track, error_m, np.nan)),
         overall_rmse_m=_rms(error_m[flying]),
         overall_max_error_m=_largest(error_m[flying]),
         waypoint_errors_m=waypoint_errors_m(log),
@@ -197,6 +200,11 @@ def _rms(values: FloatArray) -> float | None:
 def _largest(values: FloatArray) -> float | None:
     known = values[np.isfinite(values)]
     return float(known.max()) if len(known) else None
+
+
+def _time_of_largest(series: Series, values: FloatArray) -> float | None:
+    known = np.isfinite(values)
+    return float(series.time_s[int(np.nanargmax(values))]) if known.any() else None
 
 
 def _smallest(values: FloatArray) -> float | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from lcd_flight.drawing.html import Html, tag
+from lcd_flight.mission.whole_file import write_whole
 from lcd_flight.record import FlightLog
 from lcd_flight.review import sections
 from lcd_flight.review.chart import panel_html
@@ -22,9 +23,9 @@ def write_page(log: FlightLog, path: Path) -> Path:
     """Write the report of a flight and return its path.
 
     Raises:
-        OSError: the file cannot be written.
+        InputError: the file cannot be written.
     """
-    path.write_text(page(log), encoding="utf-8")
+    write_whole(path, page(log))
     return path
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from lcd_flight.drawing import colors
 from lcd_flight.drawing.html import Html, tag
+from lcd_flight.mission.whole_file import write_whole
 from lcd_flight.record import FlightLog
 from lcd_flight.review.assets import asset
 from lcd_flight.review.figures import figures_of
@@ -20,9 +21,9 @@ def write_path_figure(log: FlightLog, path: Path) -> Path:
     """Write the picture and return its path.
 
     Raises:
-        OSError: the file cannot be written.
+        InputError: the file cannot be written.
     """
-    path.write_text(path_figure(log), encoding="utf-8")
+    write_whole(path, path_figure(log))
     return path
 
 

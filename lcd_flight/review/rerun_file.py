@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from lcd_flight.mission.whole_file import write_whole
 from lcd_flight.model import RefusedError
 from lcd_flight.model.types import FloatArray
 from lcd_flight.record import FlightLog
@@ -21,15 +22,14 @@ def write_rerun(log: FlightLog, path: Path) -> Path:
     """Write the recording; its time line `flight` counts from the first tick.
 
     Raises:
-        OSError: the file cannot be written.
+        InputError: the file cannot be written.
         RefusedError: rerun-sdk is not installed.
     """
     try:
         import rerun
     except ImportError as error:
         raise RefusedError("--rerun takes rerun-sdk: pip install 'lcd-flight[rerun]'") from error
-    with path.open("ab"):
-        pass  # where it cannot be written the OSError is ours and not Rerun's
+    write_whole(path, b"")  # what is wrong with the place is said by us and not by Rerun
     with rerun.RecordingStream(f"lcd-flight {log.header.name}") as recording:
         recording.save(path)
         _log_space(rerun, recording, log)

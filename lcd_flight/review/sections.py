@@ -40,12 +40,14 @@ def warnings(log: FlightLog, *, named: bool = False) -> Html:
     if not log.complete:
         words.append(f"{which} was cut: the last moments before the cut may be missing.")
     if log.missing_ticks:
-        words.append(f"{which} lacks {log.missing_ticks} ticks within: there was no room to log them, or it is damaged.")
+        words.append(
+            f"{which} lacks {log.missing_ticks} ticks within: there was no room to log them, or it is damaged."
+        )
     return joined(tag("p", text, class_="alert") for text in words)
 
 
 def tiles(figures: FlightFigures) -> Html:
-    """The numbers that matter most."""
+    """The numbers that matter most; the script goes to the moment of the largest error where that is clicked."""
     reached = [error for error in figures.waypoint_errors_m if error is not None]
     shown = [
         ("RMS error on the trajectories", metres(figures.position_rmse_m)),
@@ -59,11 +61,8 @@ def tiles(figures: FlightFigures) -> Html:
         (f"of {figures.ticks} ticks missed", str(figures.missed_ticks)),
         ("lowest battery", number(figures.battery_min_V, "V")),
     ]
-    return tag(
-        "section",
-        *(tag("div", tag("b", value), tag("span", name), class_="tile") for name, value in shown),
-        class_="tiles",
-    )
+    worst_s = {shown[1][0]: figures.max_position_error_time_s}
+    return tag("section", *(_tile(name, value, worst_s.get(name)) for name, value in shown), class_="tiles")
 
 
 def phase_table(figures: FlightFigures) -> Html:
@@ -203,6 +202,11 @@ def milliseconds(value_s: float | None) -> str:
 def share(value: float | None) -> str:
     """A share in per cent."""
     return NOTHING if value is None else f"{100.0 * value:.1f} %"
+
+
+def _tile(name: str, value: str, time_s: float | None) -> Html:
+    when = None if time_s is None else f"{time_s:.3f}"
+    return tag("div", tag("b", value), tag("span", name), class_="tile", data_begin=when, data_end=when)
 
 
 def _segments(figures: FlightFigures, leg: int) -> int:

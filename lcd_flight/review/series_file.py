@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import io
 import math
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lcd_flight.mission.whole_file import write_whole
 from lcd_flight.model import RefusedError
 from lcd_flight.record import FlightLog, Series
 
@@ -43,13 +45,14 @@ def write_csv(log: FlightLog, path: Path) -> Path:
     """Write the series as CSV with a heading; floats with the fewest digits that read back as the same number.
 
     Raises:
-        OSError: the file cannot be written.
+        InputError: the file cannot be written.
     """
     named = columns(log.series)
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(named)
-        writer.writerows(zip(*(_cells(values) for values in named.values()), strict=True))
+    stream = io.StringIO(newline="")
+    writer = csv.writer(stream)
+    writer.writerow(named)
+    writer.writerows(zip(*(_cells(values) for values in named.values()), strict=True))
+    write_whole(path, stream.getvalue())
     return path
 
 
@@ -57,7 +60,7 @@ def write_parquet(log: FlightLog, path: Path) -> Path:
     """Write the series as Parquet, with mission, vehicle and link in the file's metadata.
 
     Raises:
-        OSError: the file cannot be written.
+        InputError: the file cannot be written.
         RefusedError: pyarrow is not installed.
     """
     try:
@@ -70,7 +73,9 @@ def write_parquet(log: FlightLog, path: Path) -> Path:
         {name: pyarrow.array(values, from_pandas=True) for name, values in columns(log.series).items()}
     )
     about = {"mission": header.name, "vehicle": header.vehicle.name, "link": header.link, "log": log.path.name}
-    parquet.write_table(table.replace_schema_metadata(about), path)
+    stream = io.BytesIO()
+    parquet.write_table(table.replace_schema_metadata(about), stream)
+    write_whole(path, stream.getvalue())
     return path
 
 

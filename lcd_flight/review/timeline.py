@@ -15,6 +15,9 @@ from lcd_flight.review.spans import Span, airborne, span_name, spans, tracking
 _BEFORE_TAKEOFF_S = 2.0
 """How much of the time on the ground is shown: a pilot may have waited for minutes."""
 
+_LONGEST_TICK_S = 0.1
+"""From here on the time between two ticks is shown as a gap: twice what the flight loop counts with at most."""
+
 _FLAGS = {Severity.INFO: "info", Severity.WARN: "warn"}
 _BANDS = {
     Phase.TAKEOFF: "climb",
@@ -31,7 +34,7 @@ _BANDS = {
 def timeline(log: FlightLog) -> Timeline:
     """One flight: from just before take-off, or all of it where there was none; s since its first tick."""
     begin_s, end_s = _shown(log)
-    return Timeline(Axis(begin_s, end_s), _bands(log, begin_s, 0.0), _flags(log.findings, begin_s))
+    return Timeline(Axis(begin_s, end_s), _bands(log, begin_s, 0.0), _flags(log.findings, begin_s), gaps(log))
 
 
 def common_timeline(logs: Sequence[FlightLog]) -> Timeline:
@@ -42,6 +45,13 @@ def common_timeline(logs: Sequence[FlightLog]) -> Timeline:
     axis = Axis(min(begin for begin, _ in shown), max(end for _, end in shown))
     first = zero_s(logs[0])
     return Timeline(axis, _bands(logs[0], axis.low + first, first), ())
+
+
+def gaps(log: FlightLog) -> list[Band]:
+    """Where ticks are missing: missed, not logged for want of room, or lost to damage."""
+    time_s = log.series.time_s
+    before = np.flatnonzero(np.diff(time_s) > _LONGEST_TICK_S)
+    return [Band("no ticks", float(time_s[n]), float(time_s[n + 1]), "missing") for n in before.tolist()]
 
 
 def zero_s(log: FlightLog) -> float:

@@ -115,6 +115,23 @@ def test_a_hold_on_the_way_does_not_spoil_a_landing() -> None:
     assert figures_of(log_of(held)).outcome is Outcome.LANDED
 
 
+def test_the_worst_moment_is_one_of_the_trajectories() -> None:
+    def away(time_s: float) -> tuple[float, float, float]:
+        return (0.9 if time_s < 1.0 else 0.5 if abs(time_s - 5.0) < 0.004 else 0.1, 0.0, 0.0)
+
+    figures = figures_of(log_of(synthetic_flight.flight(away)))
+    assert figures.max_position_error_m == pytest.approx(0.5)
+    assert figures.max_position_error_time_s == pytest.approx(5.0, abs=1e-3)
+    assert figures_of(log_of(synthetic_flight.flight()[:30])).max_position_error_time_s is None
+
+
+def test_the_attitude_is_held_against_its_setpoint() -> None:
+    figures = figures_of(log_of(synthetic_flight.flight()))
+    assert figures.max_attitude_error_rad == pytest.approx(0.0, abs=1e-6)
+    assert figures.attitude_lag_s == pytest.approx(0.0, abs=1e-3)
+    assert figures_of(log_of(synthetic_flight.flight()[:15])).max_attitude_error_rad is None
+
+
 def test_saturation_is_a_share_of_the_ticks_in_the_air() -> None:
     pairs = [(i, replace(t, saturated=400 <= t.sequence < 495)) for i, t in synthetic_flight.flight()]
     assert figures_of(log_of(pairs)).saturation_share == pytest.approx(0.1)

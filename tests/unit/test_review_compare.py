@@ -130,6 +130,13 @@ def test_flights_that_never_flew_have_a_page() -> None:
     assert "log ends in flight" in comparison([short, short])
 
 
+def test_time_without_ticks_is_shaded() -> None:
+    pairs = [pair for pair in synthetic_flight.flight() if not 400 <= pair[1].sequence < 450]
+    (gap,) = timeline(log_of(pairs)).gaps
+    assert (gap.begin_s, gap.end_s) == pytest.approx((3.99, 4.5))
+    assert timeline(flight(0.1)).gaps == []
+
+
 def test_findings_and_phases_of_one_flight_are_on_its_time() -> None:
     gap = Finding("pose_gap", Severity.LAND, "pose gap 400 ms")
     line = timeline(log_of(synthetic_flight.with_finding(synthetic_flight.flight(), 500, 504, gap)))

@@ -17,7 +17,7 @@ from synthetic_flight import log_of
 
 from lcd_flight.model import Finding, Severity
 from lcd_flight.record import FlightLog
-from lcd_flight.review import write_comparison, write_page
+from lcd_flight.review import figures_of, write_comparison, write_page
 
 pytestmark = browser.needs_browser
 
@@ -189,6 +189,21 @@ def test_one_instant_is_read_out_everywhere(tab: Tab, log: FlightLog) -> None:
     assert read == pytest.approx(log.series.p_WB[tick].tolist(), abs=0.01)
     assert "pose gap 42 ms" in tab.ask("document.querySelector('.story').textContent")
     assert "trajectory" in tab.ask("document.querySelector('.story').textContent")
+
+
+def test_a_legend_switches_its_line_off(tab: Tab) -> None:
+    shown = "getComputedStyle(document.querySelector('.trace.flown')).display"
+    assert tab.ask(shown) == "inline"
+    tab.click(".entry:has(.flown)")
+    assert tab.ask(shown) == "none"
+    tab.click(".entry:has(.flown)")
+    assert tab.ask(shown) == "inline"
+
+
+def test_a_tile_leads_to_the_worst_moment(tab: Tab, log: FlightLog) -> None:
+    tab.click(".tile[data-begin]")
+    worst_s = figures_of(log).max_position_error_time_s
+    assert float(tab.ask(CLOCK).removesuffix(" s")) == pytest.approx(worst_s, abs=0.006)
 
 
 def test_a_finding_leads_to_its_time(tab: Tab) -> None:

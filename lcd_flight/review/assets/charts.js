@@ -88,6 +88,7 @@ function levelsOf(chart) {
   let low = Infinity;
   let high = -Infinity;
   for (const number of chart.numbers) {
+    if (groups[number].classList.contains("off")) continue;
     const { times, values } = samples[number];
     for (let n = firstAt(times, shown.begin); n < times.length && times[n] <= shown.end; n += 1) {
       if (values[n] < low) low = values[n];
@@ -186,6 +187,17 @@ function placeTimes(times) {
       return span;
     }),
   );
+}
+
+// A legend's entry switches its line off and on.
+for (const chart of charts) {
+  chart.outputs.forEach((output, n) => {
+    output.parentElement.addEventListener("click", () => {
+      const off = output.parentElement.classList.toggle("off");
+      groups[chart.numbers[n]].classList.toggle("off", off);
+      changed();
+    });
+  });
 }
 
 const nameRows = [...document.querySelectorAll(".chart .phases")];

@@ -80,8 +80,8 @@ addEventListener("keydown", (event) => {
   event.preventDefault();
 });
 
-// Rows of tables lead to their time: a phase is zoomed to, a finding is gone to.
-for (const row of document.querySelectorAll("tr[data-begin]")) {
+// Rows and tiles lead to their time: a phase is zoomed to, a finding or a largest error is gone to.
+for (const row of document.querySelectorAll(":is(tr, .tile)[data-begin]")) {
   const [begin, end] = [Number(row.dataset.begin), Number(row.dataset.end)];
   row.addEventListener("click", () => {
     setInstant(begin);

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
 
@@ -14,11 +14,14 @@ from lcd_flight.cli.terminal import Terminal, following
 from lcd_flight.errors import InputError, Outcome
 
 if TYPE_CHECKING:
-    from lcd_flight.learning.evaluation import Evaluation, MethodFigures
+    from lcd_flight.learning.evaluation import Evaluation, EvaluationOptions, MethodFigures
+    from lcd_flight.learning.evaluation_files import Parts
     from lcd_flight.learning.statistics import PairedDifference
-    from lcd_flight.model import World
+    from lcd_flight.model import Tasks, World
 
 ALL = "all"
+Pairs: TypeAlias = list[tuple[str, str]]
+"""Methods to compare: the first minus the second."""
 
 
 def evaluate(
@@ -49,11 +52,7 @@ def evaluate(
 
     Run again after an interruption, it goes on where it stopped.
     """
-    from lcd_flight import plugins
-    from lcd_flight.learning.evaluate import evaluate as evaluate_methods
-    from lcd_flight.learning.evaluate import tasks_of
     from lcd_flight.learning.evaluation import EvaluationOptions
-    from lcd_flight.learning.evaluation_files import Parts
     from lcd_flight.learning.evaluation_report import report, write_report
     from lcd_flight.learning.freshness import about_seed, seed_of
     from lcd_flight.learning.task_files import load_tasks
@@ -61,7 +60,6 @@ def evaluate(
     terminal = Terminal(json_line=json, quiet=quiet, color=not no_color)
     terminal.announce_compilation()
     pairs = [_pair(text) for text in compare or []]
-    names = _methods(methods, pairs)
     options = EvaluationOptions(
         seed=seed_of(seed),
         timing="fixed" if _choice("--timing", timing, "retimed", "fixed") == "fixed" else "retimed",
@@ -72,22 +70,45 @@ def evaluate(
     )
     chosen = [(where, replace(options, drags=_drags(drag, where))) for where in _worlds(world, waypoints)]
     given = load_tasks(tasks) if tasks else count
-    simulator = plugins.simulator()
-    evaluations, finished = [], []
     terminal.line("SEED", about_seed(options.seed))
-    for where, settings in chosen:
-        flown = tasks_of(where, given, settings)
-        finished.append(Parts.of(work, where, flown, settings, simulator))
-        with following(terminal, "EVALUATE") as progress:
-            evaluations.append(evaluate_methods(where, names, flown, simulator, settings, progress, finished[-1]))
-        _show(terminal, evaluations[-1], pairs)
-    result = report(evaluations, pairs)
+    flown = [_flown(terminal, where, methods, given, settings, pairs, work) for where, settings in chosen]
+    evaluations = [evaluation for evaluation, _ in flown]
     if out:
         write_report(out, evaluations, pairs)
         terminal.line("OUT", f"{out}: evaluation.json, flights.parquet and figures")
-    for parts in finished:
+    for _, parts in flown:
         parts.discard()
-    return terminal.finish(Outcome.OK, result)
+    return terminal.finish(Outcome.OK, report(evaluations, pairs))
+
+
+def _flown(
+    terminal: Terminal,
+    where: World,
+    methods: str,
+    given: Tasks | int,
+    options: EvaluationOptions,
+    pairs: Pairs,
+    work: Path,
+) -> tuple[Evaluation, Parts]:
+    """Evaluate in one world, show the table, and keep the parts until all is done."""
+    from lcd_flight import plugins
+    from lcd_flight.learning.evaluate import evaluate as evaluate_methods
+    from lcd_flight.learning.evaluate import problem_of, refusals, tasks_of
+    from lcd_flight.learning.evaluation_files import Parts
+
+    simulator = plugins.simulator()
+    tasks = tasks_of(where, given, options)
+    names = _methods(methods, pairs)
+    if methods == ALL:
+        refused = refusals(names, problem_of(where, tasks, simulator, options, options.drags[0]))
+        names = [name for name in names if name not in refused]
+        for name, reason in refused.items():
+            terminal.warn(f"{name} is left out: {reason}")
+    parts = Parts.of(work, where, tasks, options, simulator)
+    with following(terminal, "EVALUATE") as progress:
+        evaluation = evaluate_methods(where, names, tasks, simulator, options, progress, parts)
+    _show(terminal, evaluation, pairs)
+    return evaluation, parts
 
 
 def _rate(row: MethodFigures) -> str:
@@ -106,7 +127,7 @@ COLUMNS: dict[str, Callable[[MethodFigures], str]] = {
 """Of the table for people: title and text. Errors: median and 95th percentile over the flights of their largest."""
 
 
-def _show(terminal: Terminal, evaluation: Evaluation, pairs: list[tuple[str, str]]) -> None:
+def _show(terminal: Terminal, evaluation: Evaluation, pairs: Pairs) -> None:
     """The table for people, and the comparisons asked for."""
     from rich.table import Table
 
@@ -134,7 +155,7 @@ def _difference(pair: PairedDifference) -> str:
     )
 
 
-def _methods(text: str, pairs: list[tuple[str, str]]) -> list[str]:
+def _methods(text: str, pairs: Pairs) -> list[str]:
     """Those named, and those that are compared."""
     from lcd_flight.learning.methods import METHODS
 

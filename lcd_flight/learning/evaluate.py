@@ -60,7 +60,8 @@ def evaluate(
     options = options or EvaluationOptions()
     tasks = tasks_of(world, tasks, options)
     problems = {drag: problem_of(world, tasks, simulator, options, drag) for drag in options.drags}
-    _try_out(methods, next(iter(problems.values())))
+    for error in refusals(methods, next(iter(problems.values()))).values():
+        raise error
     cells = [(name, drag) for name in methods for drag in problems]
     runs = {cell: run for cell in cells if parts and (run := parts.load(*cell))}
     meter = Meter(progress, len(tasks) * len(cells), "plans", len(tasks) * len(runs))
@@ -105,10 +106,19 @@ def _vehicle(world: World, drag: int) -> Vehicle:
         raise InputError(f"no drag configuration {drag}: {error}") from error
 
 
-def _try_out(methods: Sequence[str], problem: Problem) -> None:
-    """Plan one task by each method: what is missing is said before any work, and no clock counts loading kernels."""
-    for method in [find_method(name) for name in methods]:
-        method(problem.take(np.arange(1)))
+def refusals(methods: Sequence[str], problem: Problem) -> dict[str, InputError]:
+    """Methods that cannot plan a problem's first task, and why. Loads kernels and models too, before any clock.
+
+    Raises:
+        InputError: there is no method of a name.
+    """
+    found = {}
+    for name, method in {name: find_method(name) for name in methods}.items():
+        try:
+            method(problem.take(np.arange(1)))
+        except InputError as error:
+            found[name] = error
+    return found
 
 
 def _run(name: str, problem: Problem, options: EvaluationOptions, noise: SeedArray, meter: Meter) -> MethodRun:

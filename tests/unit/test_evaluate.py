@@ -8,7 +8,7 @@ import pytest
 from known_simulator import KnownSimulator, tasks_with_errors
 
 from lcd_flight.learning import methods
-from lcd_flight.learning.evaluate import evaluate
+from lcd_flight.learning.evaluate import evaluate, problem_of, refusals
 from lcd_flight.learning.evaluation import Evaluation, EvaluationOptions
 from lcd_flight.learning.methods import Planned, Problem
 from lcd_flight.learning.sampling import first_tasks
@@ -228,6 +228,21 @@ def test_an_unknown_method_is_named_before_any_work():
     simulator = KnownSimulator()
     with pytest.raises(InputError, match="no method `minimal`; there are minimum-snap"):
         evaluate(WORLD, ["minimum-snap", "minimal"], 5, simulator)
+    assert not simulator.calls
+
+
+def test_who_cannot_plan_is_told_beforehand(monkeypatch):
+    def refuse(problem: Problem) -> Planned:
+        raise InputError("not today")
+
+    monkeypatch.setitem(methods.METHODS, "tired", refuse)
+    problem = problem_of(WORLD, tasks_with_errors([0.1]), KnownSimulator(), EvaluationOptions(), 3)
+    assert {name: str(error) for name, error in refusals(["minimum-snap", "tired"], problem).items()} == {
+        "tired": "not today"
+    }
+    simulator = KnownSimulator()
+    with pytest.raises(InputError, match="not today"):
+        evaluate(WORLD, ["minimum-snap", "tired"], tasks_with_errors([0.1]), simulator)
     assert not simulator.calls
 
 

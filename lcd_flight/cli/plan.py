@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -77,7 +79,8 @@ def plan(
         raise InputError("give a MISSION; or --tasks FILE.npz --world W --out PLANS.npz")
     if plan_file is not None:
         _refuse("--plan", {"--from-csv": from_csv})
-    flight = tell_plan(terminal, mission, plan_file=plan_file, csv_files=from_csv or (), cache=not no_cache)
+    with _drawing_what_is_refused(terminal, mission, html):
+        flight = tell_plan(terminal, mission, plan_file=plan_file, csv_files=from_csv or (), cache=not no_cache)
     written = _write(terminal, flight, out=out, html=html, csv=csv)
     return terminal.finish(Outcome.OK, {**plan_facts(flight), **written})
 
@@ -87,6 +90,24 @@ def _refuse(option: str, others: dict[str, Any]) -> None:
     for other, value in others.items():
         if value:
             raise InputError(f"{option} and {other} exclude each other; leave one out")
+
+
+@contextmanager
+def _drawing_what_is_refused(terminal: Terminal, mission: str, html: Path | None) -> Iterator[None]:
+    """A path that breaks the mission's limits is best looked at: its page is written all the same."""
+    from lcd_flight.mission import load_mission
+    from lcd_flight.mission.airframe import vehicle_of
+    from lcd_flight.mission.planned import PathRefusedError
+    from lcd_flight.review.plan_page import write_plan_page
+
+    try:
+        yield
+    except PathRefusedError as error:
+        if html is not None:
+            loaded = load_mission(mission)
+            write_plan_page(loaded, vehicle_of(loaded), error.planned, html, refusal=str(error))
+            terminal.line("PLAN", f"refused; what it looks like: {html}")
+        raise
 
 
 def _write(

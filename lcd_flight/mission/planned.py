@@ -73,6 +73,14 @@ class PlannedMission:
         return ", ".join(dict.fromkeys(summary.method for summary in self.summaries))
 
 
+class PathRefusedError(RefusedError):
+    """A planned path breaks the mission's limits; `planned` is what was refused, so that it can be looked at."""
+
+    def __init__(self, message: str, planned: PlannedMission) -> None:
+        super().__init__(message)
+        self.planned = planned
+
+
 def planned_mission(
     mission: Mission,
     vehicle: Vehicle,
@@ -84,16 +92,17 @@ def planned_mission(
     """The flight of a mission whose trajectories are solved, one solution for each of `trajectory_tasks(mission)`.
 
     Raises:
-        RefusedError: the path leaves the geofence, breaks `planner.limits` or outlasts the battery.
+        PathRefusedError: the path leaves the geofence, breaks `planner.limits` or outlasts the battery.
     """
     tasks = trajectory_tasks(mission)
     pairs = [
         Planned(solution.trajectory, _baseline(task, solution)) for task, solution in zip(tasks, solutions, strict=True)
     ]
-    plan = flight_plan(mission, pairs)
     summaries = tuple(_summary(*row, mission, vehicle) for row in zip(tasks, solutions, pairs, strict=True))
-    _require_flyable(plan, mission, vehicle, summaries)
-    return PlannedMission(plan, summaries, tuple(solutions), card, tuple(notes), source)
+    plan = flight_plan(mission, pairs)
+    planned = PlannedMission(plan, summaries, tuple(solutions), card, tuple(notes), source)
+    _require_flyable(planned, mission, vehicle)
+    return planned
 
 
 def _baseline(task: TrajectoryTask, solution: Solution) -> Trajectory:
@@ -104,15 +113,13 @@ def _baseline(task: TrajectoryTask, solution: Solution) -> Trajectory:
     return minimum_snap(task.waypoints, durations_s)
 
 
-def _require_flyable(
-    plan: FlightPlan, mission: Mission, vehicle: Vehicle, summaries: tuple[TrajectorySummary, ...]
-) -> None:
+def _require_flyable(planned: PlannedMission, mission: Mission, vehicle: Vehicle) -> None:
     """As `require_flyable`; says, too, which trajectories are minimum snap though more was asked for."""
     try:
-        require_flyable(plan, mission, vehicle)
+        require_flyable(planned.plan, mission, vehicle)
     except RefusedError as error:
-        fallen = [f"{s.place}: the learned plan was not used: {s.fallback}" for s in summaries if s.fallback]
-        raise RefusedError("\n".join([str(error), *fallen])) from error
+        fallen = [f"{s.place}: the learned plan was not used: {s.fallback}" for s in planned.summaries if s.fallback]
+        raise PathRefusedError("\n".join([str(error), *fallen]), planned) from error
 
 
 def _summary(

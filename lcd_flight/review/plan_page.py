@@ -27,17 +27,19 @@ polyline { vector-effect: none; }
 """
 
 
-def write_plan_page(mission: Mission, vehicle: Vehicle, planned: PlannedMission, path: Path) -> Path:
+def write_plan_page(mission: Mission, vehicle: Vehicle, planned: PlannedMission, path: Path, refusal: str = "") -> Path:
     """Write the page of a plan and return its path.
+
+    refusal: why the plan may not be flown, a line for each reason.
 
     Raises:
         InputError: the place cannot be written to.
     """
-    write_whole(path, plan_page(mission, vehicle, planned))
+    write_whole(path, plan_page(mission, vehicle, planned, refusal))
     return path
 
 
-def plan_page(mission: Mission, vehicle: Vehicle, planned: PlannedMission) -> Html:
+def plan_page(mission: Mission, vehicle: Vehicle, planned: PlannedMission, refusal: str = "") -> Html:
     """The page as one HTML document."""
     head = tag(
         "head",
@@ -48,6 +50,7 @@ def plan_page(mission: Mission, vehicle: Vehicle, planned: PlannedMission) -> Ht
         tag("style", Html(colors() + asset("page.css") + _STYLE)),
     )
     content = [_heading(mission, vehicle, planned)]
+    content += [tag("p", f"Refused: {line}", class_="alert") for line in refusal.splitlines()]
     for number, shown in enumerate(_shown(mission, vehicle, planned), start=1):
         content.append(_trajectory(shown, number, len(planned.summaries)))
     if not planned.summaries:

@@ -77,6 +77,20 @@ def test_radians_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert "1.5708 looks like radians; it is read as degrees, 90 was meant?" in lcd(capsys, "check", "m.yaml")["told"]
 
 
+def test_a_refused_plan_is_drawn_all_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+    from lcd_flight.mission.load import shipped_missions
+
+    Path("m.yaml").write_text(shipped_missions()["demo"].read_text().replace("speed: 1.5", "speed: 2.6"))
+    assert run(app, ["plan", "m.yaml", "--html", "p.html", "--out", "p.json"]) == 3
+    captured = capsys.readouterr()
+    assert "PLAN       refused; what it looks like: p.html" in captured.out
+    reasons = [line.removeprefix("error: ") for line in captured.err.splitlines()]
+    assert reasons
+    page = Path("p.html").read_text()
+    assert page.count("Refused: ") == len(reasons)
+    assert not Path("p.json").exists()
+
+
 @pytest.mark.parametrize("method", ["learned", "minimum-snap"])
 def test_many_tasks(capsys: pytest.CaptureFixture[str], method: str) -> None:
     made = lcd(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import re
 import tempfile
 from datetime import datetime
@@ -33,6 +35,27 @@ def log_path(folder: Path, name: str, started: datetime) -> Path:
     taken = {path.stem for path in folder.glob(f"{stem}*")}
     count = next(n for n in range(1, len(taken) + 2) if _numbered(stem, n) not in taken)
     return folder / f"{_numbered(stem, count)}.mcap"
+
+
+def unnamed(path: Path) -> Path:
+    """Where a log is begun; it gets its name once it holds the flight's description."""
+    return path.with_name(f".{path.name}.part")
+
+
+def give_name(path: Path) -> None:
+    """Make the file at `unnamed(path)` the one at `path`, on the disk: no log of that name ever lacks its description.
+
+    Raises:
+        OSError: there is such a file already; the folder does not take it.
+    """
+    if path.exists():
+        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
+    unnamed(path).rename(path)
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
 
 
 def _numbered(stem: str, count: int) -> str:

@@ -16,6 +16,7 @@ from lcd_flight.model import MotorRequest, Phase, RefusedError, Tick, TickInputs
 from lcd_flight.record import topics
 from lcd_flight.record.display import Display, Shown
 from lcd_flight.record.header import PROFILE, FlightHeader, attachments, metadata
+from lcd_flight.record.paths import give_name, unnamed
 from lcd_flight.record.topics import TOPICS, Topic
 from lcd_flight.wire import json_records
 
@@ -48,19 +49,18 @@ class LogWriter:
         self._flushed_ns: int | None = None
         self._display = Display(flight.plan, flight.vehicle, flight.limits)
         self._turn = (False, False)
-        self._owned = isinstance(target, Path)
+        self._path = target if isinstance(target, Path) else None
         try:
-            self._stream = target.open("xb") if isinstance(target, Path) else target
+            self._stream = unnamed(target).open("wb") if isinstance(target, Path) else target
         except OSError as error:
-            raise RefusedError(f"cannot write the flight log {target}: {error.strerror}") from error
+            raise _refusal(target, error) from error
         self._mcap = Writer(self._stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
         self._channels = {topic.name: self._register(topic) for topic in TOPICS}
         try:
             self._describe()
         except OSError as error:
-            with contextlib.suppress(OSError):
-                self._let_go()
-            raise RefusedError(f"cannot write the flight log {target}: {error.strerror}") from error
+            self._abandon()
+            raise _refusal(target, error) from error
 
     def write(self, inputs: TickInputs, tick: Tick) -> None:
         """Write one tick.
@@ -107,11 +107,16 @@ class LogWriter:
             self._mcap.finish()  # type: ignore[no-untyped-call]
             self.sync()
         finally:
-            self._let_go()
+            if self._path is not None:
+                self._stream.close()
 
-    def _let_go(self) -> None:
-        if self._owned:
-            self._stream.close()
+    def _abandon(self) -> None:
+        """Leave nothing behind of a log that could not be begun."""
+        if self._path is not None:
+            with contextlib.suppress(OSError):
+                self._stream.close()
+            with contextlib.suppress(OSError):
+                unnamed(self._path).unlink(missing_ok=True)
 
     def _describe(self) -> None:
         """Put all that is known before the flight on the disk."""
@@ -122,6 +127,8 @@ class LogWriter:
         for name, (media_type, data) in attachments(self._flight).items():
             self._mcap.add_attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
         self.sync()
+        if self._path is not None:
+            give_name(self._path)
 
     def _register(self, topic: Topic) -> int:
         schema_id = self._mcap.register_schema(topic.schema_name, topic.schema_encoding, topic.schema_data())
@@ -140,3 +147,7 @@ class LogWriter:
             publish_time=tick.now_ns if publish_ns is None else publish_ns,
             sequence=tick.sequence,
         )
+
+
+def _refusal(target: Path | IO[bytes], error: OSError) -> RefusedError:
+    return RefusedError(f"cannot write the flight log {target}: {error.strerror}")

@@ -1,4 +1,4 @@
-"""`lcd monitor --foxglove`: a WebSocket client sees the log's topics with their schemas, and what stands still again."""
+"""`lcd monitor --foxglove`: a WebSocket client sees the topics of the log, and what stands still again each second."""
 
 from __future__ import annotations
 

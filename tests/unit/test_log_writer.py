@@ -233,10 +233,10 @@ def test_disarming_reaches_the_disk_at_once(tmp_path: Path, pairs: list[Pair], m
     monkeypatch.setattr(os, "fsync", synced.append)
     path = tmp_path / "disarmed.mcap"
     with closing(LogWriter(path, synthetic_flight.header())) as writer:
-        assert len(synced) == 1
+        assert len(synced) == 2  # the description, and the name in the folder
         for inputs, tick in pairs[-2:]:
             writer.write(inputs, tick)
-        assert len(synced) == 2
+        assert len(synced) == 3
         assert len(read_ticks(path)) == 2
 
 
@@ -258,6 +258,23 @@ def test_giving_up_reaches_the_disk_once(
 def test_a_log_is_never_overwritten(log: Path) -> None:
     with pytest.raises(RefusedError, match=r"cannot write the flight log .*flight\.mcap: File exists"):
         LogWriter(log, synthetic_flight.header())
+
+
+def test_a_log_has_its_name_once_it_holds_the_description(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names: list[list[str]] = []
+    monkeypatch.setattr(os, "fsync", lambda _: names.append([path.name for path in tmp_path.iterdir()]))
+    with closing(LogWriter(tmp_path / "named.mcap", synthetic_flight.header())):
+        assert names == [[".named.mcap.part"], ["named.mcap"]]
+
+
+def test_a_log_that_cannot_be_begun_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(RefusedError, match="No space left on device"):
+        LogWriter(tmp_path / "full.mcap", synthetic_flight.header())
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_full_disk_refuses_before_the_flight() -> None:

@@ -1,4 +1,7 @@
-"""Tasks from a file in place of the sampler: NumPy's .npz with `waypoints` (N, K, 3) in m and `yaws` (N, K) in rad."""
+"""Tasks from a file in place of the sampler: NumPy's .npz with `waypoints` (N, K, 3) in m and `yaws` (N, K) in rad.
+
+Or with `waypoints` (N, K, 4) alone: x, y, z in m and yaw in rad.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +22,8 @@ def load_tasks(path: Path) -> Tasks:
     """
     arrays = read_arrays(path, "`waypoints` and `yaws`")
     waypoints = read_array(path, arrays, "waypoints", "(N, K, 3) in m", dimensions=3)
+    if "yaws" not in arrays and waypoints.shape[2] == 4:
+        waypoints, arrays = waypoints[..., :3], arrays | {"yaws": waypoints[..., 3]}
     yaws = read_array(path, arrays, "yaws", "(N, K) in rad", dimensions=2)
     if waypoints.shape[2] != 3 or waypoints.shape[1] < 2 or not len(waypoints):
         raise InputError(f"{path}: waypoints has shape {waypoints.shape}; give (N, K, 3), N tasks of K >= 2 waypoints")

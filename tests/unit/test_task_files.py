@@ -20,6 +20,17 @@ def test_round_trip(tmp_path):
     assert np.array_equal(loaded.yaws_rad, YAWS + 4.0)
 
 
+def test_yaw_may_be_the_fourth_column(tmp_path):
+    path = tmp_path / "tasks.npz"
+    poses = np.concatenate([WAYPOINTS, YAWS[..., None] + 2.0], axis=2)
+    np.savez(path, waypoints=poses)
+    loaded = load_tasks(path)
+    assert np.array_equal(loaded.poses, poses)
+    np.savez(path, waypoints=poses, yaws=YAWS)
+    with pytest.raises(InputError, match=r"waypoints has shape \(2, 4, 4\); give \(N, K, 3\)"):
+        load_tasks(path)
+
+
 def test_integers_are_numbers_too(tmp_path):
     path = tmp_path / "tasks.npz"
     np.savez(path, waypoints=WAYPOINTS.astype(int), yaws=YAWS.astype(int))

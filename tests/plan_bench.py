@@ -28,13 +28,14 @@ def trajectory(waypoints: list[dict[str, Any]] = WAYPOINTS) -> dict[str, Any]:
 
 
 def mission(*trajectories: dict[str, Any], **sections: Any) -> Mission:
-    """Four waypoints, or the given trajectories, in a large room."""
+    """Four waypoints, or the given trajectories, in a large room, by `learned` where no other planner is told."""
     items = trajectories or (trajectory(),)
+    planner = {"type": "learned", "speed": 1.5} | sections.pop("planner", {})
     data: dict[str, Any] = {
         "version": 1,
         "name": "bench",
         "vehicle": {"type": "crazyflie"},
-        "planner": {"speed": 1.5},
+        "planner": planner,
         "plan": [{"takeoff": {"height": 1}}, *items, {"land": {}}],
         "safety": {"geofence": {"min": [-4, -4, 0], "max": [6, 6, 4]}},
     }

@@ -56,7 +56,7 @@ def _tell_trajectory(terminal: Terminal, summary: TrajectorySummary, whence: str
     if summary.method == "minimum-snap":
         terminal.line("PLAN", f"minimum snap, {whence}")
         if summary.fallback is not None:
-            terminal.warn(f"{summary.place}: minimum snap in place of the learned plan: {summary.fallback}")
+            terminal.warn(f"{summary.place}: minimum snap in place of the plan asked for: {summary.fallback}")
         terminal.detail(f"peak thrust {after.thrust_ratio.value:.0%}; peak speed {after.speed.value:.1f} m/s")
         return
     terminal.line("PLAN", f"minimum snap -> {summary.method}, {whence}")

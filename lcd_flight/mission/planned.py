@@ -118,7 +118,7 @@ def _require_flyable(planned: PlannedMission, mission: Mission, vehicle: Vehicle
     try:
         require_flyable(planned.plan, mission, vehicle)
     except RefusedError as error:
-        fallen = [f"{s.place}: the learned plan was not used: {s.fallback}" for s in planned.summaries if s.fallback]
+        fallen = [f"{s.place}: the plan asked for was not used: {s.fallback}" for s in planned.summaries if s.fallback]
         raise PathRefusedError("\n".join([str(error), *fallen]), planned) from error
 
 

@@ -176,4 +176,4 @@ def test_a_path_refused_says_that_the_learned_plan_was_not_used(said: Any, tmp_p
     code, facts, _ = said(app, "plan", str(mission))
     assert code == 3
     assert "outside safety.geofence" in facts["error"]
-    assert "the learned plan was not used" in facts["error"]
+    assert "the plan asked for was not used" in facts["error"]

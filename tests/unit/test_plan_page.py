@@ -95,6 +95,11 @@ def test_why_minimum_snap_is_flown() -> None:
     )
 
 
+def test_a_refused_plan_says_why() -> None:
+    page = plan_page(mission(), VEHICLE, planned(), refusal="too fast\ntoo <high>")
+    assert re.findall(r'class="alert">(.*?)</p>', page) == ["Refused: too fast", "Refused: too &lt;high&gt;"]
+
+
 def test_two_trajectories_and_none() -> None:
     twice = mission(trajectory(), trajectory(WAYPOINTS[::-1]))
     page = plan_page(twice, VEHICLE, planned(twice))

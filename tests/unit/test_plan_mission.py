@@ -92,7 +92,7 @@ def test_a_learned_cost_tells_what_it_expects_of_each_segment() -> None:
 def test_given_times_are_kept() -> None:
     timed = [WAYPOINTS[0], WAYPOINTS[1] | {"time": 1.5}, *WAYPOINTS[2:]]
     plan = [{"takeoff": {"height": 1}}, {"trajectory": {"waypoints": timed}}, {"land": {}}]
-    planned = plan_mission(mission(plan=plan, planner={"speed": 1.5}), VEHICLE, ThrustProxy())
+    planned = plan_mission(mission(plan=plan, planner={"type": "learned", "speed": 1.5}), VEHICLE, ThrustProxy())
     leg = next(leg for leg in planned.plan.legs if leg.kind is LegKind.TRAJECTORY)
     assert leg.baseline is not None
     assert leg.trajectory.durations_s.tolist() == leg.baseline.durations_s.tolist()

@@ -8,19 +8,22 @@ from lcd_flight.model import RolloutLabels, Tasks
 
 
 class KnownSimulator:
-    """Errors that are a plain function of the plan: its largest error is x of the first waypoint, in m.
+    """Errors that are a plain function of the plan: its largest error is |x| of the first waypoint, in m.
 
     broken_from: error in m from which a rollout leaves the model's validity.
+    interrupted_in: the call, counted from 1, in which Ctrl-C comes.
     """
 
-    def __init__(self, broken_from: float | None = None) -> None:
-        self.broken_from = broken_from
+    def __init__(self, broken_from: float | None = None, interrupted_in: int | None = None) -> None:
+        self.broken_from, self.interrupted_in = broken_from, interrupted_in
         self.calls: list = []
 
     def rollout(self, plans, vehicle, seeds, options):
+        if len(self.calls) + 1 == self.interrupted_in:
+            raise KeyboardInterrupt
         self.calls.append((plans, vehicle, seeds, options))
         n, segments = plans.durations_s.shape
-        error = plans.coefficients[:, 0, 0, 0].copy()
+        error = np.abs(plans.coefficients[:, 0, 0, 0])
         waypoint = np.tile(error[:, None], (1, segments + 1)) * 0.5
         waypoint[:, -1] = np.nan
         flat = np.zeros(n)

@@ -17,13 +17,13 @@ from lcd_flight.learning.evaluation import Evaluation, EvaluationOptions, Method
 from lcd_flight.learning.extras import require_pyarrow
 from lcd_flight.learning.files import writing
 from lcd_flight.learning.fingerprint import described, fingerprint
-from lcd_flight.learning.freshness import hash_of_files
+from lcd_flight.learning.freshness import hash_of_files, planner_sources
 from lcd_flight.model import InputError, Simulator, Tasks, World
 from lcd_flight.planning.cost.model_file import MODELS, SUFFIX
 
 _HOUSE = Path(__file__).parents[1]
-_BEARS_ON_RESULTS = ("control", "learning", "model", "planning", "worlds")
-"""Rooms whose code decides how plans come out and how they fly."""
+_FLIES = ("control", "model", "worlds")
+"""Rooms whose code decides how plans are flown, beside the simulator's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class Parts:
             "world": described(world),
             "options": described(options),
             "tasks": hash_of_tasks(tasks),
-            "sources": [hash_of_files(folder.rglob("*.py"), folder) for folder in _sources(simulator)],
+            "sources": hash_of_files(_sources(simulator)),
             "models": hash_of_files(_models(options)),
         }
         return Parts(root / fingerprint(decides))
@@ -122,9 +122,11 @@ def _columns(evaluation: Evaluation, method: str) -> dict[str, Any]:
 
 
 def _sources(simulator: Simulator) -> list[Path]:
-    """Folders of the code that an evaluation's result depends on."""
-    package = sys.modules[type(simulator).__module__.partition(".")[0]]
-    return [*(_HOUSE / room for room in _BEARS_ON_RESULTS), Path(inspect.getfile(package)).parent]
+    """The code that an evaluation's result depends on."""
+    module = sys.modules[type(simulator).__module__.partition(".")[0]]
+    file = Path(inspect.getfile(module))
+    flies = list(file.parent.rglob("*.py")) if hasattr(module, "__path__") else [file]
+    return [*planner_sources(), *flies, *(path for room in _FLIES for path in (_HOUSE / room).rglob("*.py"))]
 
 
 def _models(options: EvaluationOptions) -> list[Path]:

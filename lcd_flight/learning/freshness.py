@@ -22,7 +22,7 @@ _JUDGED_BY = ("methods.py", "evaluate.py", "sampling.py")
 
 def fresh_seed() -> int:
     """From 1000 up; a function of all bytes of the shipped models and of the planner's sources."""
-    digest = hash_of_files([*_shipped_models(), *_planner_sources()], _HOUSE)
+    digest = hash_of_files([*_shipped_models(), *planner_sources()], _HOUSE)
     return FIRST_REPORTED_SEED + int(digest, 16) % (_LAST_SEED - FIRST_REPORTED_SEED + 1)
 
 
@@ -55,9 +55,10 @@ def hash_of_files(files: Iterable[Path], base: Path | None = None) -> str:
     return sha.hexdigest()
 
 
+def planner_sources() -> list[Path]:
+    """All that plans, and that draws and judges tasks."""
+    return [*(_HOUSE / "planning").rglob("*.py"), *(_HOUSE / "learning" / name for name in _JUDGED_BY)]
+
+
 def _shipped_models() -> list[Path]:
     return list(MODELS.glob(f"*{SUFFIX}"))
-
-
-def _planner_sources() -> list[Path]:
-    return [*(_HOUSE / "planning").rglob("*.py"), *(_HOUSE / "learning" / name for name in _JUDGED_BY)]

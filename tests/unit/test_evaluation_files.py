@@ -28,15 +28,6 @@ def second(monkeypatch):
     monkeypatch.setitem(methods.METHODS, "second", methods.minimum_snap)
 
 
-class Interrupting(KnownSimulator):
-    """Ctrl-C comes in the third call."""
-
-    def rollout(self, plans, vehicle, seeds, options):
-        if len(self.calls) == 2:
-            raise KeyboardInterrupt
-        return super().rollout(plans, vehicle, seeds, options)
-
-
 def parts_in(root, options=OPTIONS, simulator=None):
     return Parts.of(root, WORLD, TASKS, options, simulator or KnownSimulator())
 
@@ -49,7 +40,7 @@ def flights(tmp_path, evaluation, name="flights.parquet"):
 def test_interrupted_it_goes_on_to_the_same_bytes(tmp_path):
     parts = parts_in(tmp_path / "work")
     with pytest.raises(KeyboardInterrupt):
-        evaluate(WORLD, NAMES, TASKS, Interrupting(), OPTIONS, parts=parts)
+        evaluate(WORLD, NAMES, TASKS, KnownSimulator(interrupted_in=3), OPTIONS, parts=parts)
     rest, seen = KnownSimulator(), []
     resumed = evaluate(WORLD, NAMES, TASKS, rest, OPTIONS, seen.append, parts)
     assert len(rest.calls) == 2
@@ -71,7 +62,7 @@ def test_parts_belong_to_just_one_evaluation(tmp_path, monkeypatch):
     folders.add(Parts.of(tmp_path, WORLD, tasks_with_errors([0.1]), OPTIONS, KnownSimulator()).folder)
     source = tmp_path / "method.py"
     source.write_text("x = 1")
-    monkeypatch.setattr(evaluation_files, "_sources", lambda simulator: [tmp_path])
+    monkeypatch.setattr(evaluation_files, "_sources", lambda simulator: [source])
     folders.add(parts_in(tmp_path).folder)
     source.write_text("x = 2")
     folders.add(parts_in(tmp_path).folder)

@@ -7,6 +7,7 @@ its options, the numbers of the model, the sources of the planner, and the libra
 from __future__ import annotations
 
 import hashlib
+import inspect
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, fields, is_dataclass
@@ -19,23 +20,29 @@ import numpy as np
 
 from lcd_flight.mission.assemble import TrajectoryTask
 from lcd_flight.mission.solution import Option
-from lcd_flight.model import Vehicle
+from lcd_flight.model import Simulator, Vehicle
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 _PACKAGE = Path(__file__).parents[1]
-_SOURCES = ("planning", "model")
+_SOURCES = ("planning", "model", "control")
 """Rooms whose code makes a plan what it is."""
 _LIBRARIES = ("lcd-flight", "numpy", "numba")
 
 
 def plan_key(
-    task: TrajectoryTask, vehicle: Vehicle, method: str, options: Mapping[str, Option], model: str | None
+    task: TrajectoryTask,
+    vehicle: Vehicle,
+    method: str,
+    options: Mapping[str, Option],
+    model: str | None,
+    simulator: Simulator | None = None,
 ) -> str:
     """32 hexadecimal digits: equal for plans that are equal to the bit.
 
     model: its hash, None for a method without one.
+    simulator: that the method may fly plans in; its package's sources count.
     """
     depends: dict[str, Any] = {
         "waypoints": task.waypoints.tolist(),
@@ -45,6 +52,7 @@ def plan_key(
         "options": dict(options),
         "model": model,
         "program": _program(),
+        "simulator": None if simulator is None else _sources_of(type(simulator)),
     }
     return hashlib.sha256(json.dumps(depends, sort_keys=True).encode()).hexdigest()[:32]
 
@@ -73,6 +81,15 @@ def _parts(value: Any) -> Iterator[bytes]:
         for name in names:
             yield name.encode()
             yield from _parts(getattr(value, name))
+
+
+@cache
+def _sources_of(kind: type) -> str:
+    """Of the package that a class comes from."""
+    sha = hashlib.sha256()
+    for path in sorted(Path(inspect.getfile(kind)).parent.rglob("*.py")):
+        sha.update(path.name.encode() + b"\0" + path.read_bytes())
+    return sha.hexdigest()
 
 
 @cache

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field
 
@@ -59,6 +59,9 @@ class MotionCapture(Keys):
     """Without a valid pose for so long: `safety.on_mocap_lost`."""
 
 
+PlannerType: TypeAlias = Literal["learned-polished", "learned", "analytic-polished", "analytic", "minimum-snap"]
+
+
 class PlanLimits(Keys):
     """What every planned path is held to before the rehearsal."""
 
@@ -73,8 +76,9 @@ class PlanLimits(Keys):
 class Planner(Keys):
     """How trajectories are planned."""
 
-    type: Literal["learned", "minimum-snap"] = "learned"
-    """The learned tracking cost, or minimum snap alone."""
+    type: PlannerType = "learned-polished"
+    """Minimum snap alone; lowering a formula (`analytic`) or a learned tracking cost from there; and with `-polished`
+    also a search from the plan in the simulator, with a few hundred flights."""
     model: Word | None = None
     """Learned cost: a model that ships, or a file (relative to the mission's folder); its card must match vehicle
     and loop. Left out: the one that ships for the vehicle."""

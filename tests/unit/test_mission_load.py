@@ -63,7 +63,7 @@ def test_defaults_are_those_of_the_vocabulary(tmp_path: Path) -> None:
     assert mission.geofence() == fence
     assert mission.safety_limits() == SafetyLimits(geofence=fence)
     assert mission.vehicle.uri == "sim://"
-    assert (mission.planner.type, mission.rehearse.runs) == ("learned", 20)
+    assert (mission.planner.type, mission.rehearse.runs) == ("learned-polished", 20)
 
 
 def test_every_limit_reaches_the_monitors(tmp_path: Path) -> None:

@@ -41,8 +41,15 @@ STATUS = Block(
         *((f"stateEstimate.{axis}", "float") for axis in "xyz"),
     ),
 )
-VARIANCE = Block("variance", 100, tuple((f"kalman.var{axis}", "float") for axis in "XYZ"))
-BLOCKS = (ATTITUDE, STATUS, VARIANCE)
+SLOW = Block(
+    "slow",
+    100,
+    (
+        *((f"kalman.var{axis}", "float") for axis in "XYZ"),
+        *((f"acc.{axis}", "float") for axis in "xyz"),
+    ),
+)
+BLOCKS = (ATTITUDE, STATUS, SLOW)
 """The attitude and not its angles: `stateEstimate.pitch` has the opposite sign of the commanded pitch. The variances
 are those of the position; `kalman.varPX` and its sisters, which cflib's own helper looks at, are of the velocity."""
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping
 
-from drivers.crazyflie.log_blocks import ATTITUDE, STATUS, VARIANCE
+from drivers.crazyflie.log_blocks import ATTITUDE, SLOW, STATUS
 from drivers.crazyflie.status import Status
 from drivers.crazyflie.thrust_map import FULL_SCALE
-from lcd_flight.model import Quaternion, Telemetry, Vector3
+from lcd_flight.model import GRAVITY_M_PER_S2, Quaternion, Telemetry, Vector3
 from lcd_flight.model.frames import normalized
 
 _SECOND_NS = 1_000_000_000
@@ -28,6 +28,7 @@ class Picture:
         self.p_WB: Vector3 | None = None
         self.variance_m2: float | None = None
         """Of the onboard position, the largest of the three axes."""
+        self.specific_force_B: Vector3 | None = None
         self.motor_shares: tuple[float, ...] | None = None
         self.lost = 0
         """Reports that never came."""
@@ -45,8 +46,10 @@ class Picture:
             self.motor_shares = tuple(values[f"motor.m{number}"] / FULL_SCALE for number in range(1, 5))
         elif block == STATUS.name:
             self._take_status(values)
-        elif block == VARIANCE.name:
-            self.variance_m2 = max(values[name] for name, _ in VARIANCE.variables)
+        elif block == SLOW.name:
+            self.variance_m2 = max(values[f"kalman.var{axis}"] for axis in "XYZ")
+            x, y, z = (values[f"acc.{axis}"] * GRAVITY_M_PER_S2 for axis in "xyz")
+            self.specific_force_B = (x, y, z)
 
     @property
     def complete(self) -> bool:
@@ -79,6 +82,7 @@ class Picture:
             status=None if status is None else int(status),
             q_WB=self.q_WB,
             p_WB=self.p_WB,
+            specific_force_B=self.specific_force_B,
             motor_shares=self.motor_shares,
             messages=messages,
         )

@@ -8,10 +8,10 @@ from types import TracebackType
 from typing import Self
 
 from lcd_flight.cli.terminal import Terminal
-from lcd_flight.flight.progress import Checked, Connected, Flying
+from lcd_flight.flight.progress import ByHand, Checked, Connected, Flying
 from lcd_flight.model import LegKind, Phase
 
-Event = Connected | Checked | Flying
+Event = Connected | Checked | ByHand | Flying
 CAPACITY = 100
 """Reports that may wait for the terminal; further ones are dropped, since newer ones follow."""
 BAR_WIDTH = 20
@@ -64,6 +64,8 @@ class FlightDisplay:
                     self._terminal.line("CONNECT", f"{event.uri}  {event.description}")
                 case Checked():
                     self._checked(event)
+                case ByHand():
+                    self._by_hand(event)
                 case Flying():
                     self._flying(event)
         self._terminal.end_status()
@@ -74,6 +76,13 @@ class FlightDisplay:
         for check in event.checks:
             if not check.ok:
                 self._terminal.warn(check.text)
+
+    def _by_hand(self, event: ByHand) -> None:
+        if event.checks:
+            latest = event.checks[-1]
+            self._terminal.line("BY HAND", latest.text, "" if latest.ok else "red")
+        if event.request:
+            self._terminal.line("BY HAND", f"please: {event.request}")
 
     def _flying(self, event: Flying) -> None:
         if event.entered and event.phase in PHASE_LABELS:

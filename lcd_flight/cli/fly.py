@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -27,6 +28,9 @@ def fly(
     link: Annotated[str | None, typer.Option(help="Link URI in place of the mission's.")] = None,
     fast: Annotated[bool, typer.Option("--fast", help="In virtual time, on the simulator only.")] = False,
     no_arm: Annotated[bool, typer.Option("--no-arm", help="Everything but the motors.")] = False,
+    by_hand: Annotated[
+        bool, typer.Option("--by-hand", help="With --no-arm: check pose and axes with the vehicle in the hand.")
+    ] = False,
     plan_file: PlanFile = None,
     no_cache: NoCache = False,
     plan_only: Annotated[bool, typer.Option("--plan-only", help="Stop after the rehearsal.")] = False,
@@ -48,10 +52,13 @@ def fly(
 
     if sim and link is not None:
         raise InputError("--sim and --link exclude each other; leave one out")
+    if by_hand and not no_arm:
+        raise InputError("--by-hand is done with the motors off: add --no-arm")
     terminal = Terminal(json_line=json, quiet=quiet, color=not no_color)
     terminal.announce_compilation()
     loaded = load_mission(mission)
     options = _options(terminal, loaded, "sim://" if sim else link, fast=fast, arm=not no_arm, yes=yes)
+    options = dataclasses.replace(options, by_hand=by_hand)
     flight = tell_plan(terminal, loaded, plan_file=plan_file, cache=not no_cache)
     rehearsal = _rehearse(terminal, flight, rehearse)
     facts = {"predicted_max_error_m": rehearsal.max_error_m, "log": None, "report": None}

@@ -6,9 +6,10 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
+from lcd_flight.flight.hand_check import HandCheck, watched
 from lcd_flight.flight.loop import Condition, FlightLoop
 from lcd_flight.flight.operator import Operator
-from lcd_flight.flight.progress import Checked, Progress
+from lcd_flight.flight.progress import ByHand, Checked, Progress
 from lcd_flight.flight.setup import FlightSetup
 from lcd_flight.flight.tick import EXPIRED
 from lcd_flight.model import Command, Outcome, Phase, RefusedError, Severity, Tick, TickInputs
@@ -16,6 +17,8 @@ from lcd_flight.safety.preflight import WINDOW_S, Check, preflight
 
 FIRST_POSE_S = 5.0
 """How long the first pose and the vehicle's first report may take; after that the pre-flight says what is missing."""
+BY_HAND_S = 60.0
+"""For each motion of the check by hand."""
 LINGER_S = 1.0
 """How long ticks go on after the end: for the log, and to repeat a stop."""
 
@@ -48,13 +51,16 @@ class Director:
         self._consent, self._progress = consent, progress
         self._checks: tuple[Check, ...] = ()
 
-    async def direct(self, arm: bool, idle_s: float) -> Direction:
-        """Everything that a flight is asked to do, in order; without `arm`, stand ready for a while instead."""
+    async def direct(self, arm: bool, idle_s: float, *, by_hand: bool = False) -> Direction:
+        """Everything that a flight is asked to do, in order.
+
+        Without `arm`, stand ready for a while instead, or with `by_hand` be carried through the check by hand.
+        """
         try:
             await self._check()
             if not arm:
-                await self._for_s(idle_s)
-                return Direction(self._checks, Outcome.OK)
+                return await (self._carried() if by_hand else self._stood(idle_s))
+            await self._ready()
             await self._agree()
             with self._operator.keys():
                 await self._take_off()
@@ -79,8 +85,43 @@ class Director:
         failed = [check.text for check in self._checks if not check.ok]
         if failed:
             raise RefusedError("\n".join(failed))
+
+    async def _ready(self) -> None:
         self._loop.order(Command.CHECKED)
         await self._on_ground(lambda _, decided: decided.phase is Phase.READY)
+
+    async def _stood(self, idle_s: float) -> Direction:
+        """Everything but the motors."""
+        await self._ready()
+        await self._for_s(idle_s)
+        return Direction(self._checks, Outcome.OK)
+
+    async def _carried(self) -> Direction:
+        """The check by hand, to its end or until its time is over.
+
+        Raises:
+            RefusedError: something did not agree, it was not finished, or the operator or a fault ended it.
+        """
+        check = HandCheck()
+
+        def moved_on(inputs: TickInputs, _decided: Tick) -> bool:
+            nonlocal check
+            before, check = check, watched(check, inputs, self._setup)
+            return len(check.checks) > len(before.checks)
+
+        while check.request:
+            self._tell(check)
+            ended = await self._on_ground_within(moved_on, BY_HAND_S)
+            if ended:
+                raise RefusedError(f"the check by hand was not finished: {check.request}")
+        self._tell(check)
+        if check.failed:
+            raise RefusedError("\n".join(check.failed))
+        return Direction((*self._checks, *check.checks), Outcome.OK)
+
+    def _tell(self, check: HandCheck) -> None:
+        if self._progress is not None:
+            self._progress(ByHand(check.checks, check.request))
 
     async def _agree(self) -> None:
         """Ask, while the ticks go on: the question is void as soon as the vehicle is no longer ready."""
@@ -115,6 +156,21 @@ class Director:
         first = await self._on_ground(lambda _inputs, _decided: True)
         end_ns = first.now_ns + round(duration_s * 1e9)
         await self._on_ground(lambda inputs, _: inputs.now_ns >= end_ns)
+
+    async def _on_ground_within(self, condition: Condition, limit_s: float) -> bool:
+        """Whether the time was over before a condition held."""
+        first = await self._on_ground(lambda _inputs, _decided: True)
+        end_ns, over = first.now_ns + round(limit_s * 1e9), False
+
+        def held_or_over(inputs: TickInputs, decided: Tick) -> bool:
+            nonlocal over
+            if condition(inputs, decided):
+                return True
+            over = inputs.now_ns >= end_ns
+            return over
+
+        await self._on_ground(held_or_over)
+        return over
 
     async def _on_ground(self, condition: Condition) -> Tick:
         """The first tick from now on that fulfils a condition.

@@ -39,6 +39,16 @@ class Checked:
 
 
 @dataclass(frozen=True, slots=True)
+class ByHand:
+    """The check by hand goes on."""
+
+    checks: tuple[Check, ...]
+    """Of the motions that were made."""
+    request: str
+    """What the operator is to do next; empty when nothing is left."""
+
+
+@dataclass(frozen=True, slots=True)
 class Flying:
     """How it stands."""
 
@@ -68,7 +78,7 @@ class Flying:
     """Warnings and worse that began since the last report."""
 
 
-Progress = Callable[[Connected | Checked | Flying], None]
+Progress = Callable[[Connected | Checked | ByHand | Flying], None]
 
 
 class Reporter:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Coroutine, Sequence
 from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
 from lcd_flight.flight import virtual_time
 from lcd_flight.flight.clock import RealClock
@@ -35,6 +36,8 @@ from lcd_flight.plugins.links import parse_uri
 
 SIMULATOR = "sim"
 """The link that publishes its own pose, needs no consent to arm and can be flown in virtual time."""
+INTERRUPT_POLL_S = 0.05
+Opened = TypeVar("Opened")
 LOOPBACK = "loopback://flight"
 """Where pose goes in virtual time."""
 
@@ -50,6 +53,8 @@ class FlightOptions:
     arm: bool = True
     """False: everything but the motors, for `idle_s` seconds after the pre-flight."""
     idle_s: float = 5.0
+    by_hand: bool = False
+    """Without arming: in place of standing idle, the operator carries the vehicle through the check by hand."""
     confirm: Consent | None = None
     """Asks whether to arm; needed for everything but the simulator."""
     operator: Operator = field(default_factory=Operator)
@@ -97,7 +102,7 @@ async def fly(
         stack.enter_context(options.operator.listening())
         # First, so that the threads of link and pose source get the priority too.
         notes = () if options.fast else stack.enter_context(realtime())
-        pose, link = await _opened(stack, mission, plan, vehicle, options, clock)
+        pose, link = await _unless_interrupted(_opened(stack, mission, plan, vehicle, options, clock), options.operator)
         if progress is not None:
             progress(Connected(options.uri or mission.vehicle.uri, link.description))
         loop = FlightLoop(setup, clock, link, pose, options.operator, listeners)
@@ -145,6 +150,25 @@ async def _opened(
     return pose, await stack.enter_async_context(open_link(uri, context))
 
 
+async def _unless_interrupted(opening: Coroutine[Any, Any, Opened], operator: Operator) -> Opened:
+    """What opens; it may take long, and there is nothing yet that could land.
+
+    Raises:
+        RefusedError: the operator asked for something meanwhile, whatever it was.
+    """
+    task = asyncio.ensure_future(opening)
+    try:
+        while not task.done():
+            if operator():
+                raise RefusedError("interrupted while connecting")
+            await asyncio.wait({task}, timeout=INTERRUPT_POLL_S)
+        return await task
+    finally:
+        if not task.done():
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+
+
 def is_simulated(uri: str) -> bool:
     """Whether a link leads to the simulator.
 
@@ -169,7 +193,7 @@ async def _flown(
     """Run loop and director to the director's end. If either fails, bring the vehicle down before anything else."""
     director = Director(loop, setup, options.operator, options.confirm, progress)
     ticking = asyncio.ensure_future(loop.run())
-    directing = asyncio.ensure_future(director.direct(options.arm, options.idle_s))
+    directing = asyncio.ensure_future(director.direct(options.arm, options.idle_s, by_hand=options.by_hand))
     try:
         await asyncio.wait({ticking, directing}, return_when=asyncio.FIRST_COMPLETED)
         if ticking.done():

@@ -25,6 +25,8 @@ class Telemetry:
     """Onboard attitude estimate."""
     p_WB: Vector3 | None = None
     """Onboard position estimate in m."""
+    specific_force_B: Vector3 | None = None
+    """What the accelerometers measure, m/s^2: at rest, gravity upwards."""
     motor_shares: tuple[float, ...] | None = None
     """Motor commands as shares of full scale, 0 to 1."""
     messages: tuple[str, ...] = ()

@@ -6,14 +6,18 @@ cflib by itself waits for ever for an answer that was lost.
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from crazyflie_bench import CLOCK, START_M, Bench, bench, level, stream, wait_ms
+from short_mission import Listener, mission, plan, vehicle
 
 from drivers.crazyflie import connection, parameters
 from drivers.crazyflie.connect import SILENCE_NS
+from lcd_flight.flight.operator import Operator
+from lcd_flight.flight.session import FlightOptions, run_flight
 from lcd_flight.model import Link, LinkReport, RefusedError
 
 pytestmark = pytest.mark.realtime
@@ -224,3 +228,14 @@ async def fly_up(link: Link) -> None:
     report = await stream(link, level(1.3), 0.4)
     assert report.telemetry is not None
     assert report.telemetry.airborne
+
+
+def test_the_operator_may_end_the_connecting() -> None:
+    operator, listener = Operator(), Listener()
+    nobody = {"type": "crazyflie", "uri": "udp://127.0.0.1:1"}
+    flown = mission(vehicle=nobody, motion_capture={"endpoint": "loopback://nobody"})
+    threading.Timer(0.3, operator.interrupt).start()
+    with pytest.raises(RefusedError, match="interrupted while connecting"):
+        run_flight(flown, plan(), vehicle(), FlightOptions(arm=False, operator=operator), observers=(listener,))
+    assert listener.flight == []
+    assert listener.closed == 1

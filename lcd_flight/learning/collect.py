@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -68,12 +69,15 @@ def fill(
         manifest = Manifest(dataset)
         meter.begin(sum(min(manifest.rows(job.number), job.rows) for job in jobs))
         missing = [job for job in jobs if manifest.rows(job.number) < job.rows]
-        for job, made in spread(_Signed(make), missing):
-            fresh = job.rows - manifest.rows(job.number)
-            dataset.write(job.number, made.rollouts, made.checked())
-            manifest.add(job.number)
-            meter.advance(fresh, note or f"shard {job.number + 1} of {len(jobs)}")
-        manifest.write()
+        try:
+            for job, made in spread(_Signed(make), missing):
+                fresh = job.rows - manifest.rows(job.number)
+                dataset.write(job.number, made.rollouts, made.checked())
+                manifest.add(job.number)
+                meter.advance(fresh, note or f"shard {job.number + 1} of {len(jobs)}")
+        finally:
+            with suppress(InputError):  # where a disk is full, what was wrong first is to be told
+                manifest.write()
         write_card(dataset, manifest)
 
 

@@ -70,13 +70,12 @@ class Manifest:
         return [self._entries[number] for number in sorted(self._entries)]
 
     def add(self, number: int) -> None:
-        """Take in a shard that was just written, and write the manifest.
+        """Take in a shard that was just written.
 
         Raises:
-            InputError: it cannot be written.
+            InputError: it is damaged.
         """
         self._look_at(number)
-        self.write()
 
     def write(self) -> None:
         """Write `manifest.json`, whole or not at all.

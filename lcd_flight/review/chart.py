@@ -201,7 +201,7 @@ def _band(band: Band, timeline: Timeline) -> Html:
 
 def _flag(flag: Flag, timeline: Timeline) -> Html:
     x = round(timeline.across(flag.begin_s) * WIDTH, 1)
-    return tag("line", tag("title", flag.name), x1=x, x2=x, y1=0, y2=HEIGHT, class_=f"flag {flag.style}")
+    return tag("line", x1=x, x2=x, y1=0, y2=HEIGHT, class_=f"flag {flag.style}")
 
 
 def _level(axis: Axis, value: float, style: str | None) -> Html:

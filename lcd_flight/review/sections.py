@@ -10,11 +10,13 @@ import msgspec
 from lcd_flight.drawing.html import Html, joined, tag
 from lcd_flight.drawing.scale import MINUS
 from lcd_flight.model import Outcome, Severity
-from lcd_flight.record import FlightLog
+from lcd_flight.record import FlightLog, TimedFinding
 from lcd_flight.review.figures import FlightFigures
 
 _VERDICTS = {Outcome.LANDED: "good", Outcome.ABORTED: "warn", Outcome.CRASHED: "bad", Outcome.CUT: "bad"}
 _SEVERITIES = {Severity.INFO: "info", Severity.WARN: "warn"}
+_MOST_FINDINGS = 400
+"""Rows of their table."""
 NOTHING = "\N{EN DASH}"
 
 
@@ -124,6 +126,7 @@ def finding_table(log: FlightLog) -> Html:
     """A row for each finding; the script goes to the time of the one that is clicked."""
     if not log.findings:
         return card("Findings", tag("p", "None: nothing was out of the ordinary.", class_="note"), wide=True)
+    shown = sorted(sorted(log.findings, key=_by_severity)[:_MOST_FINDINGS], key=lambda found: found.begin_s)
     rows = [
         tag(
             "tr",
@@ -134,10 +137,12 @@ def finding_table(log: FlightLog) -> Html:
             data_begin=f"{found.begin_s:.3f}",
             data_end=f"{found.end_s:.3f}",
         )
-        for found in log.findings
+        for found in shown
     ]
+    left_out = len(log.findings) - len(shown)
+    note = tag("p", f"{left_out} more are in the log; the most severe are shown.", class_="note") if left_out else None
     head = tag("tr", *(tag("th", text) for text in ("at", "severity", "lasted")), tag("th", "what", class_="text"))
-    return card("Findings", tag("div", tag("table", head, *rows), class_="scroll"), wide=True)
+    return card("Findings", tag("div", tag("table", head, *rows), class_="scroll"), note, wide=True)
 
 
 def configuration(log: FlightLog) -> Html:
@@ -164,7 +169,7 @@ def configuration(log: FlightLog) -> Html:
     )
 
 
-def card(title: str, *content: Html, wide: bool = False) -> Html:
+def card(title: str, *content: Html | None, wide: bool = False) -> Html:
     """A titled box."""
     return tag("section", tag("h2", title), *content, class_="card wide" if wide else "card")
 
@@ -202,6 +207,10 @@ def milliseconds(value_s: float | None) -> str:
 def share(value: float | None) -> str:
     """A share in per cent."""
     return NOTHING if value is None else f"{100.0 * value:.1f} %"
+
+
+def _by_severity(found: TimedFinding) -> tuple[int, float]:
+    return -found.finding.severity, found.begin_s
 
 
 def _tile(name: str, value: str, time_s: float | None) -> Html:

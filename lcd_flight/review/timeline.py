@@ -18,6 +18,9 @@ _BEFORE_TAKEOFF_S = 2.0
 _LONGEST_TICK_S = 0.1
 """From here on the time between two ticks is shown as a gap: twice what the flight loop counts with at most."""
 
+_MOST_FLAGS = 150
+"""Marks of findings on a time axis: a monitor that flickers for minutes must not fill the page."""
+
 _FLAGS = {Severity.INFO: "info", Severity.WARN: "warn"}
 _BANDS = {
     Phase.TAKEOFF: "climb",
@@ -33,8 +36,8 @@ _BANDS = {
 
 def timeline(log: FlightLog) -> Timeline:
     """One flight: from just before take-off, or all of it where there was none; s since its first tick."""
-    begin_s, end_s = _shown(log)
-    return Timeline(Axis(begin_s, end_s), _bands(log, begin_s, 0.0), _flags(log.findings, begin_s), gaps(log))
+    axis = Axis(*_shown(log))
+    return Timeline(axis, _bands(log, axis.low, 0.0), _flags(log.findings, axis), gaps(log))
 
 
 def common_timeline(logs: Sequence[FlightLog]) -> Timeline:
@@ -82,14 +85,17 @@ def _style(span: Span, log: FlightLog) -> str:
     return _BANDS.get(span.phase, "ground")
 
 
-def _flags(findings: Sequence[TimedFinding], begin_s: float) -> list[Flag]:
-    return [
-        Flag(
-            f"{row.finding.code}: {row.finding.message}",
-            row.begin_s,
-            row.end_s,
-            _FLAGS.get(row.finding.severity, "severe"),
-        )
-        for row in findings
-        if row.begin_s >= begin_s
-    ]
+def _flags(findings: Sequence[TimedFinding], axis: Axis) -> list[Flag]:
+    """Of findings that begin too near to each other to be told apart: the most severe, and how many more there are."""
+    together: dict[int, list[TimedFinding]] = {}
+    for row in findings:
+        if row.begin_s >= axis.low:
+            together.setdefault(int(_MOST_FLAGS * (row.begin_s - axis.low) / (axis.high - axis.low)), []).append(row)
+    return [_flag(rows) for rows in together.values()]
+
+
+def _flag(rows: Sequence[TimedFinding]) -> Flag:
+    worst = max(rows, key=lambda row: row.finding.severity)
+    more = f" (and {len(rows) - 1} more)" if len(rows) > 1 else ""
+    text = f"{worst.finding.code}: {worst.finding.message}{more}"
+    return Flag(text, worst.begin_s, max(row.end_s for row in rows), _FLAGS.get(worst.finding.severity, "severe"))

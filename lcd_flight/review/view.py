@@ -73,7 +73,7 @@ def path_drawing(space: Space, *, still: bool = False) -> Html:
 def _shapes(space: Space, view: View, *, still: bool) -> Iterator[Html]:
     """From the back to the front."""
     yield from (_line(line, view, "floor") for line in space.floor())
-    yield from (_line(edge, view, "fence") for edge in space.edges())
+    yield from (_line(edge, view, "fence" if space.fenced else "box") for edge in space.edges())
     yield from (_line(space.on_floor(row.points), view, "shadow") for row in space.flown if len(row.points))
     for waypoint in space.waypoints:
         yield _line(np.stack([waypoint, space.on_floor(waypoint[None])[0]]), view, "drop")

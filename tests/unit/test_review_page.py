@@ -15,7 +15,7 @@ import synthetic_flight
 from synthetic_flight import log_of
 
 from lcd_flight.model import Finding, FlightPlan, Geofence, PoseReport, Severity
-from lcd_flight.record import FlightLog, Series
+from lcd_flight.record import FlightLog, Series, TimedFinding
 from lcd_flight.review import write_page, write_path_figure
 from lcd_flight.review.page import page
 from lcd_flight.review.plots import panels
@@ -137,6 +137,20 @@ def test_nothing_in_a_log_becomes_markup() -> None:
     )
     assert EVIL not in html
     assert outline(html).count("script") == 2  # ours, and the samples
+
+
+def test_a_monitor_that_flickers_does_not_fill_the_page(log: FlightLog) -> None:
+    flicker = [
+        TimedFinding(t, t + 0.004, Finding("link_loss", Severity.WARN, f"loses {n} %"))
+        for n, t in enumerate(np.linspace(1.0, 9.0, 3000).tolist())
+    ]
+    worst = TimedFinding(8.9, 8.9, Finding("fence", Severity.LAND, "0.1 m outside"))
+    html = page(replace(log, findings=(*flicker, worst)))
+    assert len(html) < len(page(log)) + 400_000
+    assert "fence: 0.1 m outside" in html
+    assert "2601 more are in the log" in html
+    assert "fence: 0.1 m outside (and " in html  # the mark of the worst one stands for those around it
+    assert outline(html).count("i", "flag") <= 151
 
 
 def test_a_cut_log_says_so(log: FlightLog) -> None:

@@ -95,7 +95,7 @@ function isNow(element, longer = 0) {
 }
 
 function tellStory() {
-  const phase = phases.find((span) => isNow(span)) ?? phases.at(-1);
+  const phase = phases.find((span) => isNow(span)) ?? phases.at(phases.length && instant < Number(phases[0].dataset.begin) ? 0 : -1);
   const found = flags.filter((flag) => isNow(flag, FLAG_SHOWN_S));
   story.replaceChildren(...(phase ? [mark(phase.title, "")] : []));
   for (const flag of found) {

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import datetime
 import json
+import sys
 import tempfile
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from benchmarks.campaign_crazyflie_fuzz import crazyflie_fuzz
 from lcd_flight import api
 from lcd_flight.learning.sampling import first_tasks
 from lcd_flight.mission.task_mission import task_mission
@@ -22,10 +24,10 @@ RESULTS = ROOT / "docs" / "campaigns"
 
 
 def main() -> None:
-    """Run all campaigns."""
+    """Run all campaigns, or those that are named."""
     RESULTS.mkdir(parents=True, exist_ok=True)
-    for name, campaign in CAMPAIGNS.items():
-        result = {"date": datetime.date.today().isoformat(), "campaign": name, **campaign()}
+    for name in sys.argv[1:] or CAMPAIGNS:
+        result = {"date": datetime.date.today().isoformat(), "campaign": name, **CAMPAIGNS[name]()}
         path = RESULTS / f"{result['date']}-{name}.json"
         path.write_text(json.dumps(result, indent=1) + "\n")
         print(f"{path.relative_to(ROOT)}: {json.dumps(result.get('summary', result))}")  # noqa: T201
@@ -75,7 +77,10 @@ def _word(verdict: dict[str, Any]) -> str:
     return "passes" if verdict["passed"] else "refused"
 
 
-CAMPAIGNS: dict[str, Callable[[], dict[str, Any]]] = {"rehearsed-tasks": rehearsed_tasks}
+CAMPAIGNS: dict[str, Callable[[], dict[str, Any]]] = {
+    "rehearsed-tasks": rehearsed_tasks,
+    "crazyflie-fuzz": crazyflie_fuzz,
+}
 
 
 if __name__ == "__main__":

@@ -86,7 +86,10 @@ class Logs(Generic[Seen]):
     def due(self, now_ms: int, seen: Callable[[], Seen]) -> list[Packet]:
         """The data packets that fall due by `now_ms`, at most one a block; `seen` is asked only where there are any."""
         due = [(number, b) for number, b in self._blocks.items() if b.due_ms is not None and b.due_ms <= now_ms]
-        return [self._sent(number, block, now_ms, seen()) for number, block in due]
+        if not due:
+            return []
+        values = seen()
+        return [self._sent(number, block, now_ms, values) for number, block in due]
 
     def _sent(self, number: int, block: _Block, now_ms: int, seen: Seen) -> Packet:
         block.due_ms = now_ms + block.period_ms if block.period_ms else None

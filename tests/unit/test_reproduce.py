@@ -21,6 +21,7 @@ from lcd_flight.model import InputError
 from lcd_flight.worlds import load_world
 
 SETTINGS = ReproduceSettings(seed=5)
+ROOT = Path(__file__).parents[2]
 
 
 def test_each_table_and_each_model_has_a_name_of_its_own():
@@ -222,3 +223,10 @@ def test_paragraphs_on_methods_that_were_not_flown_are_left_out(light, tmp_path,
     assert "reinforcement-learning baseline** (100 %" in page(result, [])
     fewer = [replace(e, methods=tuple(m for m in e.methods if m != "paper")) for e in result.experiments]
     assert "The objective as released" not in page(replace(result, experiments=fewer), [])
+
+
+def test_what_the_page_points_to_is_there(light, tmp_path):
+    text = page(reproduce(QUICK, tmp_path, KnownSimulator(), lambda progress: None), [])
+    targets = re.findall(r"\]\((\.\./[^)#\s]+)\)", text)
+    assert targets
+    assert [t for t in targets if not (ROOT / "docs" / "results" / t).resolve().exists()] == []

@@ -130,8 +130,8 @@ def test_the_time_that_is_left_follows_the_pace(monkeypatch):
     ]
 
 
-@pytest.fixture
-def light(monkeypatch):
+@pytest.fixture(scope="module")
+def light():
     """Every method is minimum snap, every training a file: the course of a reproduction without its work."""
     trained = []
 
@@ -140,61 +140,66 @@ def light(monkeypatch):
         out.parent.mkdir(parents=True, exist_ok=True)
         out.touch()
 
-    minimum = METHODS["minimum-snap"]
-    for name in METHODS:
-        monkeypatch.setitem(METHODS, name, minimum)
-    monkeypatch.setattr(reproduce_module, "train", train)
-    return trained
+    with pytest.MonkeyPatch.context() as patch:
+        minimum = METHODS["minimum-snap"]
+        for name in METHODS:
+            patch.setitem(METHODS, name, minimum)
+        patch.setattr(reproduce_module, "train", train)
+        yield trained
 
 
 QUICK = ReproduceSettings(seed=5, count=6, noise_seeds=2, quick=True)
 
 
-def test_a_course_from_nothing_to_the_page(light, tmp_path):
-    simulator = KnownSimulator()
-    told = []
-    result = reproduce(QUICK, tmp_path / "work", simulator, told.append)
-    assert light == [config.name for config in trainings(QUICK)]
-    assert told[-1].stage == told[-1].stages == len(light) + len(result.experiments)
-    path = write_results(result, tmp_path / "out", simulator)
+@pytest.fixture(scope="module")
+def course(light, tmp_path_factory):
+    """One whole course: the result, its work folder, its calls of the simulator, what it told."""
+    work, simulator, told = tmp_path_factory.mktemp("course"), KnownSimulator(), []
+    result = reproduce(QUICK, work, simulator, told.append)
+    return result, work, simulator.calls, told
+
+
+def test_a_course_from_nothing_to_the_page(light, course, tmp_path):
+    result, work, _, told = course
+    models = [config.name for config in trainings(QUICK)]
+    assert light[: len(models)] == models
+    assert told[-1].stage == told[-1].stages == len(models) + len(result.experiments)
+    path = write_results(result, tmp_path, KnownSimulator())
     text = path.read_text()
     assert "{{" not in text
     assert "tries out every step" in text
     shown = set(re.findall(r"\]\(([\w.-]+\.(?:svg|json))\)", text))
     assert shown == {p.name for p in path.parent.iterdir()} - {"README.md"}
-    assert str(tmp_path) not in text + (path.parent / "results.json").read_text()
+    assert str(work) not in text + (path.parent / "results.json").read_text()
     for method in METHODS:
         assert f"| `{method}` |" in text
 
 
-def test_the_page_says_the_rates_that_were_measured(light, tmp_path):
-    simulator = KnownSimulator()
-    result = reproduce(QUICK, tmp_path, simulator, lambda progress: None)
-    numbers = json.loads((write_results(result, tmp_path / "out", simulator).parent / "results.json").read_text())
-    text = (tmp_path / "out" / "README.md").read_text()
+def test_the_page_says_the_rates_that_were_measured(course, tmp_path):
+    text = write_results(course[0], tmp_path, KnownSimulator()).read_text()
+    numbers = json.loads((tmp_path / "results.json").read_text())
     figures = numbers["experiments"]["crazyflie-paper-fixed"]["methods"]["minimum-snap"]
-    world = load_world("crazyflie-paper")
-    crashed = np.abs(first_tasks(world.sampler, 5, 6).waypoints_m[:, 0, 0]) > 1.5
+    crashed = np.abs(first_tasks(load_world("crazyflie-paper").sampler, 5, 6).waypoints_m[:, 0, 0]) > 1.5
     assert figures["crash_rate"] == pytest.approx(100.0 * crashed.mean(), rel=1e-4)
     assert f"gives {figures['crash_rate']:.1f} ({figures['crash_rate_error']:.1f}) % for minimum snap" in text
 
 
-def test_run_again_it_flies_nothing_and_says_the_same(light, tmp_path):
-    first = reproduce(QUICK, tmp_path, KnownSimulator(), lambda progress: None)
-    again_in = KnownSimulator()
-    again = reproduce(QUICK, tmp_path, again_in, lambda progress: None)
-    assert not again_in.calls
-    assert page(replace(again, seconds=first.seconds), []) == page(first, [])
+def test_run_again_it_flies_nothing_and_says_the_same(course):
+    result, work, _, _ = course
+    simulator = KnownSimulator()
+    again = reproduce(QUICK, work, simulator, lambda progress: None)
+    assert not simulator.calls
+    assert page(replace(again, seconds=result.seconds), []) == page(result, [])
 
 
-def test_interrupted_it_goes_on(light, tmp_path):
+def test_interrupted_it_goes_on(course, tmp_path):
+    result, _, calls, _ = course
     with pytest.raises(KeyboardInterrupt):
         reproduce(QUICK, tmp_path, KnownSimulator(interrupted_in=31), lambda progress: None)
-    rest, whole = KnownSimulator(), KnownSimulator()
+    rest = KnownSimulator()
     resumed = reproduce(QUICK, tmp_path, rest, lambda progress: None)
-    fresh = reproduce(QUICK, tmp_path / "other", whole, lambda progress: None)
-    assert len(rest.calls) == len(whole.calls) - 30
-    for name, evaluation in fresh.evaluations.items():
+    assert len(rest.calls) == len(calls) - 30
+    for name, evaluation in result.evaluations.items():
         for method, run in evaluation.runs.items():
             assert np.array_equal(resumed.evaluations[name].runs[method].max_error_m, run.max_error_m)
 
@@ -217,16 +222,15 @@ def test_a_model_for_each_drag_flies_in_its_own(light, tmp_path, monkeypatch):
         assert ("hummingbird-paper", c_D, f"hummingbird-paper-drag-{drag}-medium") in seen
 
 
-def test_paragraphs_on_methods_that_were_not_flown_are_left_out(light, tmp_path, monkeypatch):
-    result = reproduce(QUICK, tmp_path, KnownSimulator(), lambda progress: None)
+def test_paragraphs_on_methods_that_were_not_flown_are_left_out(course):
+    result = course[0]
     assert "The objective as released" in page(result, [])
     assert "reinforcement-learning baseline** (100 %" in page(result, [])
     fewer = [replace(e, methods=tuple(m for m in e.methods if m != "paper")) for e in result.experiments]
     assert "The objective as released" not in page(replace(result, experiments=fewer), [])
 
 
-def test_what_the_page_points_to_is_there(light, tmp_path):
-    text = page(reproduce(QUICK, tmp_path, KnownSimulator(), lambda progress: None), [])
-    targets = re.findall(r"\]\((\.\./[^)#\s]+)\)", text)
+def test_what_the_page_points_to_is_there(course):
+    targets = re.findall(r"\]\((\.\./[^)#\s]+)\)", page(course[0], []))
     assert targets
     assert [t for t in targets if not (ROOT / "docs" / "results" / t).resolve().exists()] == []

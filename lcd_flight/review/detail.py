@@ -29,28 +29,37 @@ _NOTHING = 65535
 
 
 def packed(traces: Sequence[Trace], most_samples: int = MOST_SAMPLES) -> str:
-    """The traces as text, in their order.
+    """The traces as text, in their order; of long flights those that the path is played by come a second time, evenly.
 
-    Base64 of zlib of: the header's length (u32), the header (JSON: sample counts and ranges), then for each time base
-    its times (f32, s), then for each trace its values as differences of u16, all low bytes before all high ones, which
-    packs best. All little-endian.
+    Base64 of zlib of: the header's length (u32), the header (JSON: sample counts, and range, time base and role of each
+    trace), then for each time base its times (f32, s), then for each trace its values as differences of u16, all low
+    bytes before all high ones, which packs best. All little-endian.
     """
-    most = max(200, most_samples // max(1, len(traces)))
-    bases: dict[int, int] = {}
+    played = [trace for trace in traces if trace.role]
+    most = max(200, most_samples // max(1, len(traces) + len(played)))
     times: list[bytes] = []
-    rows: list[dict[str, float]] = []
+    rows: list[dict[str, float | str]] = []
     columns: list[bytes] = []
-    for trace in traces:
-        time_s, values = samples(trace.time_s, trace.values, most)
-        if id(trace.time_s) not in bases:
-            bases[id(trace.time_s)] = len(times)
+    bases: dict[tuple[int, bool], int] = {}
+    for trace, even in [*((trace, False) for trace in traces), *((trace, True) for trace in played)]:
+        if even and len(trace.values) <= most:
+            continue
+        time_s, values = evenly(trace.time_s, trace.values, most) if even else samples(trace.time_s, trace.values, most)
+        base = bases.setdefault((id(trace.time_s), even), len(times))
+        if base == len(times):
             times.append(time_s.astype("<f4").tobytes())
         low, high, levels = _quantised(values)
-        rows.append({"base": bases[id(trace.time_s)], "low": low, "high": high})
+        rows.append({"base": base, "low": low, "high": high, "role": trace.role})
         columns.append(_differences(levels))
     header = msgspec.json.encode({"counts": [len(part) // 4 for part in times], "traces": rows})
     data = b"".join([struct.pack("<I", len(header)), header, *times, *columns])
     return base64.b64encode(zlib.compress(data, 9)).decode("ascii")
+
+
+def evenly(time_s: FloatArray, values: FloatArray, most: int) -> tuple[FloatArray, FloatArray]:
+    """Times and values at equal steps, both ends among them: coordinates of a path belong to one instant."""
+    chosen = np.linspace(0, len(values) - 1, min(most, len(values))).round().astype(np.int64)
+    return time_s[chosen], values[chosen]
 
 
 def samples(time_s: FloatArray, values: FloatArray, most: int) -> tuple[FloatArray, FloatArray]:

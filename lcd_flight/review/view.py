@@ -96,7 +96,7 @@ def _flown(number: int, row: Flown, view: View) -> Iterator[Html]:
 
 def _vehicle(number: int, row: Flown, view: View) -> Html:
     """Where the vehicle is: a dot here; the script adds its arms, its thrust and the way to its reference."""
-    lines = [tag("polyline", class_=part) for part in ("gap", "arm", "arm", "up")]
+    lines = [tag("polyline", class_=part) for part in ("gap", "arm", "arm", "nose", "up")]
     dot = tag("circle", r=4.5, **_place(row.points[-1], view))
     target = tag("circle", r=4, class_="target", display="none")
     return tag("g", *lines, target, dot, class_=f"now {row.style}", data_flight=number)

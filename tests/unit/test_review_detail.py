@@ -93,3 +93,20 @@ def test_stretches_without_values_stay_without() -> None:
 def test_what_never_changes_survives(values: list[float]) -> None:
     ((_, back),) = unpacked(packed([trace(np.arange(float(len(values))), np.array(values))]))
     np.testing.assert_array_equal(back, values)
+
+
+def test_the_path_of_a_long_flight_keeps_its_coordinates_together() -> None:
+    """Least and greatest values of x and y are of different instants: what is played must not be made of them."""
+    time_s = np.arange(20_000) / 100
+    rows = [Trace(name, time_s, wave(time_s), "flown", f"0/{name}") for name, wave in (("x", np.cos), ("y", np.sin))]
+    back = unpacked(packed(rows, most_samples=8_000))
+    assert len(back) == 4
+    (times, x), (_, y) = back[2:]
+    assert len(times) == 2_000
+    np.testing.assert_allclose(np.hypot(x, y), 1.0, atol=1e-4)
+    np.testing.assert_allclose(x, np.cos(times), atol=1e-4)
+
+
+def test_a_short_flight_is_there_once() -> None:
+    time_s = np.arange(100) / 100
+    assert len(unpacked(packed([Trace("x", time_s, time_s, "flown", "0/x")]))) == 1

@@ -70,7 +70,8 @@ for (const button of document.querySelectorAll("[data-do]")) {
 const keys = { " ": "play", "+": "in", "-": "out", 0: "whole", f: "fit" };
 
 addEventListener("keydown", (event) => {
-  if (event.target.closest("input, select, button, summary") || event.ctrlKey || event.metaKey || event.altKey) return;
+  const taken = event.target.closest("select, button, summary") || (event.target === slider && event.key.startsWith("Arrow"));
+  if (taken || event.ctrlKey || event.metaKey || event.altKey) return;
   if (event.key === "ArrowLeft" || event.key === "ArrowRight") {
     const sign = event.key === "ArrowLeft" ? -1 : 1;
     if (event.shiftKey) pan(sign * 0.3);

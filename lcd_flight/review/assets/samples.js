@@ -36,9 +36,9 @@ async function unpacked(text) {
   let place = 4 + size;
   const take = (length) => data.slice(place, (place += length));
   const bases = header.counts.map((count) => new Float32Array(take(4 * count)));
-  return header.traces.map(({ base, low, high }) => {
+  return header.traces.map(({ base, low, high, role }) => {
     const count = header.counts[base];
-    return { times: bases[base], values: dequantised(new Uint8Array(take(2 * count)), count, low, high) };
+    return { role, times: bases[base], values: dequantised(new Uint8Array(take(2 * count)), count, low, high) };
   });
 }
 
@@ -88,7 +88,10 @@ function smoothAt(role, time) {
 async function refine() {
   if (!("DecompressionStream" in window)) return; // an old browser keeps what is drawn
   const finer = await unpacked(document.getElementById("samples").textContent);
-  finer.forEach((trace, number) => (samples[number] = trace));
+  finer.forEach((trace, number) => {
+    samples[number] = trace;
+    byRole.set(trace.role, number); // of two with a role the second: evenly sampled, for the path
+  });
   document.body.classList.add("fine");
   changed();
 }

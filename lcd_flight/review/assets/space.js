@@ -78,10 +78,11 @@ function drawVehicle({ flight, lines, target, dot }) {
   const [forward, left, up] = attitudeOf(flight, instant);
   const from = (u, v, w) => at.map((value, n) => value + arm * (u * forward[n] + v * left[n] + w * up[n]));
   const goal = positionOf(flight, "reference-", instant);
-  const [gap, one, other, thrust] = lines;
+  const [gap, one, other, nose, thrust] = lines;
   gap.setAttribute("points", goal ? projected([at, goal]) : "");
   one.setAttribute("points", projected([from(0.7, 0.7, 0), from(-0.7, -0.7, 0)]));
   other.setAttribute("points", projected([from(0.7, -0.7, 0), from(-0.7, 0.7, 0)]));
+  nose.setAttribute("points", projected([at, from(0.9, 0, 0)]));
   thrust.setAttribute("points", projected([at, from(0, 0, 1)]));
   moveTo(dot, at);
   target.setAttribute("display", goal ? "inline" : "none");

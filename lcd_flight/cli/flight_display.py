@@ -40,22 +40,26 @@ class FlightDisplay:
         self._thread = threading.Thread(target=self._run, name="flight-display", daemon=True)
 
     def __call__(self, event: Event) -> None:
-        """Take an event; never waits."""
+        """Take an event; never waits. The first begins the thread, which so inherits the priority of the loop: one of
+        lower priority would be put aside while it holds the interpreter, and ticks would wait for it (decision 0081).
+        """
+        if self._thread.ident is None:
+            self._thread.start()
         telling = not isinstance(event, Flying) or event.entered or event.findings
         if telling or self._queue.qsize() < CAPACITY:
             self._queue.put(event)
 
     def __enter__(self) -> Self:
-        """Start showing."""
-        self._thread.start()
+        """Nothing to do before the first event."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Show what is left, for a second at most."""
-        self._queue.put(None)
-        self._thread.join(1.0)
+        if self._thread.ident is not None:
+            self._queue.put(None)
+            self._thread.join(1.0)
 
     def _run(self) -> None:
         while (event := self._queue.get()) is not None:

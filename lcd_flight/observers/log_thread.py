@@ -61,10 +61,11 @@ class LogThread:
         self._error: str | None = None
         # A daemon: a disk that hangs for ever must not keep the process.
         self._thread = threading.Thread(target=self._run, name="flight-log", daemon=True)
-        self._thread.start()
 
     def observe(self, inputs: TickInputs, tick: Tick) -> None:
-        """Queue one tick."""
+        """Queue one tick. The first begins the thread, which so inherits the priority that the flight has by then."""
+        if not self._observed:
+            self._thread.start()
         self._observed += 1
         if self._room is not None:
             self._room.acquire()
@@ -74,6 +75,8 @@ class LogThread:
 
     def close(self) -> None:
         """Wait until all that is queued is on the disk, but no longer than `close_wait_s`. May be called again."""
+        if self._thread.ident is None:
+            self._thread.start()
         self._queue.put(None)
         self._thread.join(self._close_wait_s)
         if self._thread.is_alive():

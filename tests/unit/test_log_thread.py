@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from contextlib import suppress
 from pathlib import Path
@@ -143,6 +144,23 @@ def test_closing_twice_is_closing_once() -> None:
     thread.close()
     thread.close()
     assert sink.closed == 1
+
+
+def test_the_thread_has_the_priority_of_the_loop() -> None:
+    """One of lower priority would be put aside while it holds the interpreter, and the loop would wait for it."""
+    log = LogThread(Sink())
+    found: list[int] = []
+
+    def fly() -> None:
+        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))  # of this thread; needs no permission
+        log.observe(*PAIRS[0])
+        found.append(os.sched_getscheduler(log._thread.native_id or 0))
+
+    loop = threading.Thread(target=fly)
+    loop.start()
+    loop.join()
+    log.close()
+    assert found == [os.SCHED_BATCH]
 
 
 def test_a_real_log_comes_back_whole(tmp_path: Path) -> None:

@@ -40,10 +40,8 @@ class FlightDisplay:
         self._thread = threading.Thread(target=self._run, name="flight-display", daemon=True)
 
     def __call__(self, event: Event) -> None:
-        """Take an event; never waits. The first begins the thread, which so inherits the priority of the loop: one of
-        lower priority would be put aside while it holds the interpreter, and ticks would wait for it (decision 0081).
-        """
-        if self._thread.ident is None:
+        """Take an event; never waits. The first begins the thread, which so inherits the priority of the loop."""
+        if self._thread.ident is None:  # decision 0081: below the loop's priority it could keep ticks waiting
             self._thread.start()
         telling = not isinstance(event, Flying) or event.entered or event.findings
         if telling or self._queue.qsize() < CAPACITY:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -187,6 +188,20 @@ def test_a_cut_file_is_refused(tmp_path: Path) -> None:
     path = plan_file(tmp_path)
     path.write_text(path.read_text()[:1000])
     assert "no plan file (EOF while parsing" in refused(path)
+
+
+def test_a_full_disk_leaves_the_file_that_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = plan_file(tmp_path)
+    before = path.read_bytes()
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(InputError, match=r"plan\.json: cannot be written \(No space left on device\)"):
+        write_plan(path, planned(), mission(), VEHICLE)
+    assert path.read_bytes() == before
+    assert [kept.name for kept in tmp_path.iterdir()] == ["plan.json"]
 
 
 def test_places_that_cannot_be_read_or_written(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -141,6 +142,20 @@ def test_it_never_goes_on_from_something_else(
     other = counted(monkeypatch)
     plan(tmp_path / "plans.npz", change(MINIMUM_SNAP))
     assert len(other.blocks) == 3
+
+
+@pytest.mark.usefixtures("small_blocks")
+def test_it_never_goes_on_with_another_model_in_the_same_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "mine.safetensors"
+    planning = replace(MINIMUM_SNAP, model=str(file))
+    planned = []
+    for content, fail_at in ((b"one", 8), (b"other", None)):
+        file.write_bytes(content)
+        method = counted(monkeypatch, fail_at)
+        with nullcontext() if fail_at is None else pytest.raises(KeyboardInterrupt):
+            plan(tmp_path / "plans.npz", planning)
+        planned.append(len(method.blocks))
+    assert planned == [2, 3]
 
 
 @pytest.mark.usefixtures("small_blocks")

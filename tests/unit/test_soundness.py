@@ -53,6 +53,9 @@ def test_a_missed_waypoint_is_named() -> None:
     waypoints[3, 1] += 0.25
     assert flaw(PLAN, waypoints) == "misses waypoint 4 by 0.25 m in y"
     waypoints = WAYPOINTS.copy()
+    waypoints[-1, 2] += 0.5
+    assert flaw(PLAN, waypoints) == "misses waypoint 5 by 0.5 m in z"
+    waypoints = WAYPOINTS.copy()
     waypoints[0, 3] += 0.5
     assert flaw(PLAN, waypoints) == "misses waypoint 1 by 0.5 rad in yaw"
 

@@ -139,11 +139,6 @@ class Log(Keys):
     """Folder for logs and reports (relative to where the command is run)."""
     format: Literal["mcap"] = "mcap"
     """File format."""
-    vehicle_log: Annotated[
-        dict[Annotated[str, Field(pattern=r"^\w+\.\w+$")], Annotated[Real, Field(gt=0.0, le=100.0)]],
-        Field(examples=[{"pm.vbat": 10}]),
-    ] = Field(default_factory=dict)
-    """Variables of the vehicle's own log and their rates in Hz; for links to vehicles that have one."""
 
 
 class Rehearse(Keys):

@@ -34,4 +34,5 @@ def plant_kernel() -> Any:
 
 def _compiler() -> Compiler:
     # No option that lets the compiler assume finite numbers: a diverged vehicle is NaN and must be seen as such.
-    return Compiler(*SOURCES, error_model="numpy", nogil=True, fastmath={"contract", "nsz", "arcp"})
+    # No counting of references: kernels keep no array, and every count waits for the other cores.
+    return Compiler(*SOURCES, error_model="numpy", nogil=True, _nrt=False, fastmath={"contract", "nsz", "arcp"})

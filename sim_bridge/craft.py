@@ -9,11 +9,11 @@ import numpy as np
 from lcd_flight.control.flight_law import thrust_limit_N
 from lcd_flight.control.geometric import Allocation
 from lcd_flight.model import GeometricGains, InputError, Loop, Vehicle
+from sim_bridge.kernels.block import Craft
 from sim_bridge.kernels.guidance import Law
 from sim_bridge.kernels.lane import TICK_S
 from sim_bridge.kernels.multirotor import airframe
 from sim_bridge.kernels.onboard import NO_ONBOARD, onboard
-from sim_bridge.kernels.rollout import Craft
 
 SUBSTEPS = 2
 """Runge-Kutta steps of a tick in the paper's loop: 0.05 mm from the converged solution over 4.5 s."""

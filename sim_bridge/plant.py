@@ -14,10 +14,11 @@ from sim_bridge.compiled import plant_kernel
 from sim_bridge.craft import craft_of
 from sim_bridge.kernels import rows
 from sim_bridge.kernels.judge import MAX_RATE, MAX_SPEED
+from sim_bridge.kernels.lane import turn_rotors
 from sim_bridge.kernels.multirotor import Motion
 from sim_bridge.kernels.onboard import received, roll_pitch_yaw
 from sim_bridge.kernels.plant import IMPACT_SPEED, IMPACT_UPRIGHT
-from sim_bridge.kernels.rows import LANES, ROWS, load4, load_motion, store3, store4, store_motion
+from sim_bridge.kernels.rows import LANES, ROWS, load4, load_motion, store3, store_motion
 
 CRASH_SPEED = 3.0
 """m/s downward at touchdown; as if dropped from half a metre."""
@@ -46,7 +47,7 @@ class Plant:
         floor_m: float | None = None,
     ) -> None:
         self._craft = craft_of(vehicle, vehicle, "flight")
-        self._weight_N = vehicle.weight_N
+        self._vehicle = vehicle
         self._seed = np.uint64(seed % 2**64)
         self._floor_m = state.p_WB[2] if floor_m is None else floor_m
         self._period_ns = round(_NS_PER_S * self._craft.step_s)
@@ -58,7 +59,7 @@ class Plant:
         store_motion(self._memory, rows.MOTION, 0, Motion(state.p_WB, state.v_WB_W, state.q_WB, state.w_WB_B))
         store3(self._memory, rows.PID + 6, 0, roll_pitch_yaw(rotation_of(state.q_WB)))
         if not self.on_ground:
-            store4(self._memory, rows.SPEEDS, 0, (self._craft.initial_speed,) * 4)
+            turn_rotors(self._memory, 0, (self._craft.initial_speed,) * 4, self._craft.air)
         self.crashed = False
         """Whether it hit the floor hard or tilted, or left what the model holds for; its motors have stopped."""
 
@@ -100,7 +101,7 @@ class Plant:
             return
         plant_kernel()(self._memory, self._contact, self._seed, self._periods, periods, self._craft, self._floor_m)
         self._periods += periods
-        self._battery = self._battery.drained(self._thrust_N / self._weight_N, periods * self._craft.step_s)
+        self._battery = self._battery.drained(self._thrust_N / self._vehicle.weight_N, periods * self._craft.step_s)
         if self._has_crashed():
             self.crashed = True
             self.stop()
@@ -137,7 +138,7 @@ class Plant:
     def _thrust_N(self) -> float:
         """Static thrust of the rotors as they turn."""
         a, b, c, d = load4(self._memory, rows.SPEEDS, 0)
-        return float(self._craft.air.k_eta * (a * a + b * b + c * c + d * d))
+        return float(self._vehicle.k_eta * (a * a + b * b + c * c + d * d))
 
     def _has_crashed(self) -> bool:
         """Whether it may not fly on; what is not a number is within nothing."""

@@ -23,8 +23,8 @@ from sim_bridge.compiled import rollout_kernel
 from sim_bridge.craft import craft_of
 from sim_bridge.kernels import rows
 from sim_bridge.kernels.lane import TICK_S
-from sim_bridge.kernels.rollout import LABELS, Plans, Results
-from sim_bridge.kernels.rows import LANES
+from sim_bridge.kernels.rollout import Plans, Results, Scratch
+from sim_bridge.kernels.rows import LABELS, LANES
 
 _MOST_BLOCKS_AT_A_TIME = 4
 """Handed to a thread in one call: few, to share them evenly and to be interrupted soon."""
@@ -82,16 +82,29 @@ def _over_blocks(blocks: int, threads: int, arguments: tuple[Any, ...]) -> None:
     parts = [(start, min(start + size, blocks)) for start in range(0, blocks, size)]
     if threads == 1 or len(parts) <= 1:
         for part in parts:
-            kernel(*part, *arguments)
+            kernel(*part, *arguments, _scratch())
         return
     with ThreadPoolExecutor(threads) as pool:
-        work = [pool.submit(kernel, *part, *arguments) for part in parts]
+        work = [pool.submit(kernel, *(*part, *arguments, _scratch())) for part in parts]
         try:
             for done in work:
                 done.result()
         except BaseException:  # above all KeyboardInterrupt: what has not begun is not flown any more
             pool.shutdown(wait=True, cancel_futures=True)
             raise
+
+
+def _scratch() -> Scratch:
+    """Memory for one call of the kernel."""
+    size = rows.ROWS * LANES
+    memory = np.empty(size + 8)
+    first = -memory.ctypes.data // memory.itemsize % 8
+    return Scratch(
+        memory[first : first + size],
+        np.empty(LANES, dtype=np.int64),
+        np.empty(LANES, dtype=np.int64),
+        np.empty(LANES, dtype=np.uint64),
+    )
 
 
 def _prepare(plans: Trajectories, seeds: SeedArray, options: RolloutOptions) -> Plans:
@@ -114,6 +127,7 @@ def _prepare(plans: Trajectories, seeds: SeedArray, options: RolloutOptions) -> 
         end_ticks=end_ticks,
         yaws_rad=np.ascontiguousarray(yaws),
         gaps=gaps,
+        has_gaps=bool((gaps[:, 1] > gaps[:, 0]).any()),
         seeds=np.ascontiguousarray(seeds, dtype=np.uint64),
     )
 
@@ -148,4 +162,4 @@ def labels_of(results: Results) -> RolloutLabels:
     )
 
 
-_LABEL_ROWS = range(rows.ALIVE, rows.ROWS)
+_LABEL_ROWS = range(rows.ALIVE, rows.ALIVE + LABELS)

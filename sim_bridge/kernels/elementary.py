@@ -15,11 +15,11 @@ _HALF_PI_HIGH = 1.5707963267341256
 """Its last bits are zero, so that small multiples of it are exact; the rest of pi / 2 is `_HALF_PI_LOW`."""
 _HALF_PI_LOW = 6.077100506506192e-11
 _TAN_PI_8 = math.tan(math.pi / 8.0)
-_SQRT_2 = math.sqrt(2.0)
 _LN_2 = math.log(2.0)
 _EXPONENT_BITS = np.int64(52)
 _MANTISSA = np.int64(0x000FFFFFFFFFFFFF)
-_ONE = np.int64(0x3FF0000000000000)
+_SQRT_HALF = np.int64(0x3FE6A09E667F3BCD)
+"""The bits of the square root of 1/2, where the mantissas' range begins."""
 
 
 def cos_sin(angle_rad: float) -> tuple[float, float]:
@@ -42,9 +42,9 @@ def arctan2(y: float, x: float) -> float:
     ax, ay = abs(x), abs(y)
     steep = ay > ax
     low, high = (ax if steep else ay), (ay if steep else ax)
-    ratio = low / (high if high > 0.0 else 1.0)
-    large = ratio > _TAN_PI_8
-    t = (ratio - 1.0) / (ratio + 1.0) if large else ratio
+    large = low > _TAN_PI_8 * high
+    over, under = (low - high if large else low), (low + high if large else high)
+    t = over / (under if under > 0.0 else 1.0)
     angle = t * _arctan_over(t * t) + (0.25 * math.pi if large else 0.0)
     angle = 0.5 * math.pi - angle if steep else angle
     angle = math.pi - angle if x < 0.0 else angle
@@ -60,11 +60,9 @@ def _arctan_over(z: float) -> float:
 
 def logarithm(x: float) -> float:
     """The natural logarithm of a positive, normal number."""
-    bits = np.float64(x).view(np.int64)
-    mantissa = np.int64((bits & _MANTISSA) | _ONE).view(np.float64)
-    large = mantissa > _SQRT_2
-    exponent = np.float64(bits >> _EXPONENT_BITS) - (1022.0 if large else 1023.0)
-    half = 0.5 * mantissa if large else mantissa
-    f = (half - 1.0) / (half + 1.0)
+    above = np.int64(np.float64(x).view(np.int64) - _SQRT_HALF)
+    exponent = above >> _EXPONENT_BITS
+    mantissa = np.int64((above & _MANTISSA) + _SQRT_HALF).view(np.float64)
+    f = (mantissa - 1.0) / (mantissa + 1.0)
     z = f * f
-    return exponent * _LN_2 + 2.0 * f * (1.0 + z * (1.0 / 3 + z * (1.0 / 5 + z * (1.0 / 7 + z / 9))))
+    return np.float64(exponent) * _LN_2 + 2.0 * f * (1.0 + z * (1.0 / 3 + z * (1.0 / 5 + z * (1.0 / 7 + z / 9))))

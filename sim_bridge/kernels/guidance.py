@@ -21,7 +21,7 @@ from lcd_flight.control.geometric import (
 from lcd_flight.model import FloatArray, Vector3
 from sim_bridge.kernels import rows
 from sim_bridge.kernels.elementary import cos_sin
-from sim_bridge.kernels.lane import TICK_S
+from sim_bridge.kernels.lane import TICK_S, aim_rotors
 from sim_bridge.kernels.multirotor import Airframe
 from sim_bridge.kernels.onboard import (
     DEGREES,
@@ -63,6 +63,8 @@ class Sample(NamedTuple):
     yaw_rad: float
     yaw_rate: float
     yaw_acceleration: float
+    heading: tuple[float, float]
+    """Cosine and sine of the yaw."""
 
 
 def refer(memory: FloatArray, lane: int, tick: float) -> None:
@@ -76,12 +78,18 @@ def refer(memory: FloatArray, lane: int, tick: float) -> None:
     store3(memory, rows.REFERENCE + 3, lane, (x[1], y[1], z[1]))
     store3(memory, rows.REFERENCE + 6, lane, (x[2], y[2], z[2]))
     store3(memory, rows.REFERENCE + 9, lane, yaw)
+    cosine, sine = cos_sin(yaw[0])
+    memory[(rows.REFERENCE + 12) * LANES + lane] = cosine
+    memory[(rows.REFERENCE + 13) * LANES + lane] = sine
 
 
 def horner(memory: FloatArray, row: int, lane: int, time: float) -> Vector3:
     """Value, first and second derivative of the polynomial of order 7 whose coefficients begin at `row`."""
-    value, first, half_second = memory[(row + 7) * LANES + lane], 0.0, 0.0
-    for k in range(6, -1, -1):
+    highest = memory[(row + 7) * LANES + lane]
+    value = highest * time + memory[(row + 6) * LANES + lane]
+    half_second, first = highest, highest * time + value
+    value = value * time + memory[(row + 5) * LANES + lane]
+    for k in range(4, -1, -1):
         half_second = half_second * time + first
         first = first * time + value
         value = value * time + memory[(row + k) * LANES + lane]
@@ -97,23 +105,35 @@ def reference(memory: FloatArray, lane: int) -> Sample:
         memory[(rows.REFERENCE + 9) * LANES + lane],
         memory[(rows.REFERENCE + 10) * LANES + lane],
         memory[(rows.REFERENCE + 11) * LANES + lane],
+        (memory[(rows.REFERENCE + 12) * LANES + lane], memory[(rows.REFERENCE + 13) * LANES + lane]),
     )
 
 
-def command_rotors(memory: FloatArray, lane: int, law: Law, air: Airframe) -> None:
-    """The paper's loop: the law's force and moment straight to rotor speeds."""
-    p, v, q, w = load_motion(memory, rows.SEEN, lane)
+def ask_force(memory: FloatArray, lane: int, seen: int, law: Law) -> None:
+    """The paper's loop: the force that the law wants."""
+    p, v, _, _ = load_motion(memory, seen, lane)
     ref = reference(memory, lane)
     acceleration = acceleration_setpoint(p, v, ref.p_W, ref.v_W, ref.a_W, law.position_gain, law.velocity_gain)
-    force = scaled(acceleration, law.mass_kg)
-    R_WB = rotation_of(q)
-    R_WD = attitude_setpoint(force, cos_sin(ref.yaw_rad))
+    store3(memory, rows.FORCE, lane, scaled(acceleration, law.mass_kg))
+
+
+def ask_wrench(memory: FloatArray, lane: int, seen: int, law: Law, feed_forward: bool) -> None:
+    """The paper's loop: thrust and moment for the force that is asked for."""
+    _, _, q, w = load_motion(memory, seen, lane)
+    ref, force, R_WB = reference(memory, lane), load3(memory, rows.FORCE, lane), rotation_of(q)
+    R_WD = attitude_setpoint(force, ref.heading)
     turn = moment(R_WB, R_WD, w, ref.yaw_rate, law.inertia_kg_m2, law.attitude_gain, law.rate_gain)
-    if law.feed_forward:
+    if feed_forward:
         desired, change = (0.0, 0.0, ref.yaw_rate), (0.0, 0.0, ref.yaw_acceleration)
         more = moment_feed_forward(R_WB, R_WD, w, desired, change, law.inertia_kg_m2)
         turn = (turn[0] + more[0], turn[1] + more[1], turn[2] + more[2])
-    wanted = rotor_speeds(dot(force, R_WB[2]), turn, law.allocation)
+    store4(memory, rows.WRENCH, lane, (dot(force, R_WB[2]), turn[0], turn[1], turn[2]))
+
+
+def command_rotors(memory: FloatArray, lane: int, law: Law, air: Airframe) -> None:
+    """The paper's loop: rotor speeds for thrust and moment, within their limits."""
+    thrust_N, x, y, z = load4(memory, rows.WRENCH, lane)
+    wanted = rotor_speeds(thrust_N, (x, y, z), law.allocation)
     low, high = air.speed_min, air.speed_max
     given = (
         clipped(wanted[0], low, high),
@@ -121,18 +141,17 @@ def command_rotors(memory: FloatArray, lane: int, law: Law, air: Airframe) -> No
         clipped(wanted[2], low, high),
         clipped(wanted[3], low, high),
     )
-    store4(memory, rows.COMMANDS, lane, given)
+    aim_rotors(memory, lane, given, air)
     memory[rows.CLIPS * LANES + lane] = differing(wanted, given)
 
 
-def command_attitude(memory: FloatArray, lane: int, law: Law, controller: Onboard) -> None:
+def command_attitude(memory: FloatArray, lane: int, seen: int, law: Law, controller: Onboard) -> None:
     """The flight loop: the law's thrust and attitude as the setpoint of the onboard controller."""
-    p, v, q, _ = load_motion(memory, rows.SEEN, lane)
+    p, v, q, _ = load_motion(memory, seen, lane)
     ref = reference(memory, lane)
     integral = load3(memory, rows.INTEGRAL, lane)
     acceleration = acceleration_setpoint(p, v, ref.p_W, ref.v_W, ref.a_W, law.position_gain, law.velocity_gain)
-    heading = cos_sin(ref.yaw_rad)
-    thrust_N, R_WD = thrust_and_attitude(acceleration, integral, rotation_of(q)[2], heading, law.mass_kg)
+    thrust_N, R_WD = thrust_and_attitude(acceleration, integral, rotation_of(q)[2], ref.heading, law.mass_kg)
     dt_s = 0.0 if thrust_N > law.thrust_limit_N else TICK_S
     error = (p[0] - ref.p_W[0], p[1] - ref.p_W[1], p[2] - ref.p_W[2])
     store3(memory, rows.INTEGRAL, lane, integrated(integral, error, law.integral_gain, law.integral_limit, dt_s))
@@ -165,7 +184,7 @@ def stabilise(memory: FloatArray, lane: int, air: Airframe, controller: Onboard)
         clipped(speed_of(given[2], high), low, high),
         clipped(speed_of(given[3], high), low, high),
     )
-    store4(memory, rows.COMMANDS, lane, speeds)
+    aim_rotors(memory, lane, speeds, air)
     memory[rows.CLIPS * LANES + lane] += differing(asked, given) * (controller.period_s / TICK_S)
 
 

@@ -9,9 +9,9 @@ import numpy as np
 from lcd_flight.control.geometric import dot
 from lcd_flight.model import FloatArray
 from sim_bridge.kernels import rows
-from sim_bridge.kernels.elementary import arctan2, cos_sin
+from sim_bridge.kernels.elementary import arctan2
 from sim_bridge.kernels.guidance import reference
-from sim_bridge.kernels.rows import LANES, load_motion
+from sim_bridge.kernels.rows import LANES, load4, load_motion
 
 MAX_SPEED = 20.0
 """m/s, each axis: RotorPy's early exit."""
@@ -19,9 +19,9 @@ MAX_RATE = 100.0
 """rad/s, each axis: likewise."""
 
 
-def judge(memory: FloatArray, lane: int, tick: float) -> None:
+def judge_position(memory: FloatArray, lane: int, tick: float) -> None:
     """Add this tick's errors to the labels, unless the rollout is over or has left the model's validity."""
-    p, v, q, w = load_motion(memory, rows.MOTION, lane)
+    p, v, _, w = load_motion(memory, rows.MOTION, lane)
     ref = reference(memory, lane)
     fastest = max(abs(v[0]), abs(v[1]), abs(v[2]))
     quickest = max(abs(w[0]), abs(w[1]), abs(w[2]))
@@ -29,12 +29,10 @@ def judge(memory: FloatArray, lane: int, tick: float) -> None:
     running = tick <= memory[rows.LAST_TICK * LANES + lane]
     memory[rows.ALIVE * LANES + lane] = 1.0 if alive else (0.0 if running else memory[rows.ALIVE * LANES + lane])
     counts = alive & running
+    memory[rows.COUNTS * LANES + lane] = 1.0 if counts else 0.0
     e = (p[0] - ref.p_W[0], p[1] - ref.p_W[1], p[2] - ref.p_W[2])
     e_v = (v[0] - ref.v_W[0], v[1] - ref.v_W[1], v[2] - ref.v_W[2])
     square = dot(e, e)
-    yaw = arctan2(2.0 * (q[3] * q[2] + q[0] * q[1]), 1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2]))
-    e_yaw = yaw - ref.yaw_rad
-    wrapped = e_yaw - 2.0 * math.pi * np.floor(e_yaw / (2.0 * math.pi) + 0.5)
     largest = memory[rows.LARGEST * LANES + lane]
     record = counts & (square > largest)
     memory[rows.LARGEST * LANES + lane] = square if record else largest
@@ -45,15 +43,31 @@ def judge(memory: FloatArray, lane: int, tick: float) -> None:
     add(memory, rows.SUM, lane, math.sqrt(square), counts)
     add(memory, rows.SUM_2, lane, square, counts)
     add(memory, rows.SUM_8, lane, (square * square) * (square * square), counts)
-    add(memory, rows.YAW_COST, lane, 2.0 * (1.0 - cos_sin(e_yaw)[0]), counts)
-    add(memory, rows.PAPER_COST, lane, square + wrapped * wrapped, counts)
-    add(memory, rows.RELEASED_COST, lane, square + dot(e_v, e_v) + e_yaw * e_yaw, counts)
+    add(memory, rows.PAPER_COST, lane, square, counts)
+    add(memory, rows.RELEASED_COST, lane, square + dot(e_v, e_v), counts)
 
 
-def count_clips(memory: FloatArray, lane: int, tick: float) -> None:
-    """Add this tick's clipped motor commands to the saturation labels."""
+def judge_yaw(memory: FloatArray, lane: int) -> None:
+    """Add this tick's error of the yaw, after `judge_position`."""
+    x, y, z, w = load4(memory, rows.MOTION + 6, lane)
+    ref = reference(memory, lane)
+    counts = memory[rows.COUNTS * LANES + lane] > 0.0
+    ahead, left = 1.0 - 2.0 * (y * y + z * z), 2.0 * (w * z + x * y)
+    cosine, sine = ref.heading[0] * ahead + ref.heading[1] * left, ref.heading[0] * left - ref.heading[1] * ahead
+    wrapped = arctan2(sine, cosine)
+    yaw = ref.yaw_rad + wrapped
+    e_yaw = wrapped - 2.0 * math.pi * np.floor(yaw / (2.0 * math.pi) + 0.5)
+    size = math.sqrt(cosine * cosine + sine * sine)
+    share = cosine / size if size > 0.0 else 1.0
+    add(memory, rows.YAW_COST, lane, 2.0 - 2.0 * share, counts)
+    add(memory, rows.PAPER_COST, lane, wrapped * wrapped, counts)
+    add(memory, rows.RELEASED_COST, lane, e_yaw * e_yaw, counts)
+
+
+def count_clips(memory: FloatArray, lane: int) -> None:
+    """Add this tick's clipped motor commands to the saturation labels, after `judge_position`."""
     clips = memory[rows.CLIPS * LANES + lane]
-    counts = (memory[rows.ALIVE * LANES + lane] > 0.0) & (tick <= memory[rows.LAST_TICK * LANES + lane])
+    counts = memory[rows.COUNTS * LANES + lane] > 0.0
     add(memory, rows.CLIPPED, lane, clips, counts)
     run = memory[rows.RUN * LANES + lane] + 1.0 if clips > 0.0 else 0.0
     memory[rows.RUN * LANES + lane] = run

@@ -9,11 +9,11 @@ import numpy as np
 from lcd_flight.control.geometric import clipped
 from lcd_flight.model import FloatArray
 from sim_bridge.kernels import rows
+from sim_bridge.kernels.block import Craft
 from sim_bridge.kernels.guidance import stabilise
-from sim_bridge.kernels.lane import advance, disturb
+from sim_bridge.kernels.lane import disturb, draw, fly_step
 from sim_bridge.kernels.multirotor import Motion
 from sim_bridge.kernels.noise import key_of
-from sim_bridge.kernels.rollout import Craft
 from sim_bridge.kernels.rows import LANES, load_motion, store_motion
 
 IMPACT_SPEED = 0
@@ -30,10 +30,11 @@ def fly_periods(
     for period in range(first, first + count):
         before = load_motion(memory, rows.MOTION, 0)
         stabilise(memory, 0, craft.air, craft.onboard)
-        advance(memory, 0, craft.air, craft.step_s, craft.motor_decay)
+        fly_step(memory, 0, craft.air, craft.step_s, craft.motor_decay)
         spins = memory[rows.SETPOINT * LANES] > 0.0
         if (period + 1) % craft.steps == 0 and craft.motor_noise > 0.0 and spins:
-            disturb(memory, 0, key, np.uint64((period + 1) // craft.steps), craft.air, craft.motor_noise)
+            draw(memory, 0, key, np.uint64((period + 1) // craft.steps))
+            disturb(memory, 0, craft.air, craft.motor_noise)
         after = load_motion(memory, rows.MOTION, 0)
         if after.p_WB[2] < floor_m:
             stood = before.p_WB[2] <= floor_m

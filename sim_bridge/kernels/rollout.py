@@ -8,16 +8,11 @@ import numpy as np
 
 from lcd_flight.model import FloatArray, IntArray, SeedArray
 from sim_bridge.kernels import rows
-from sim_bridge.kernels.guidance import Law, command_attitude, command_rotors, refer, stabilise
-from sim_bridge.kernels.judge import count_clips, judge
-from sim_bridge.kernels.lane import TICK_S, advance, disturb, look, remember
-from sim_bridge.kernels.multirotor import Airframe
+from sim_bridge.kernels.block import Craft, command_tick, fly_tick, judge_tick
+from sim_bridge.kernels.lane import TICK_S, remember, turn_rotors
 from sim_bridge.kernels.noise import key_of
-from sim_bridge.kernels.onboard import DEGREES, Onboard
-from sim_bridge.kernels.rows import LANES, ROWS
-
-LABELS = ROWS - rows.ALIVE
-"""How many rows of a lane's memory are its result, from ALIVE on."""
+from sim_bridge.kernels.onboard import DEGREES
+from sim_bridge.kernels.rows import LABELS, LANES, ROWS
 
 
 class Plans(NamedTuple):
@@ -37,27 +32,23 @@ class Plans(NamedTuple):
     """(N,) initial heading."""
     gaps: FloatArray
     """(N, 2) first tick without pose, first tick with pose again."""
+    has_gaps: bool
+    """Whether any row has one."""
     seeds: SeedArray
     """(N,)"""
 
 
-class Craft(NamedTuple):
-    """What flies it, all the way down to the rotors."""
+class Scratch(NamedTuple):
+    """What a thread needs to fly a block; contents do not matter."""
 
-    air: Airframe
-    law: Law
-    onboard: Onboard
-    flight_loop: bool
-    """Whether the law's thrust and attitude go to the onboard controller; else its force and moment to the rotors."""
-    steps: int
-    """Runge-Kutta steps of a tick; in the flight loop, periods of the onboard controller."""
-    step_s: float
-    motor_noise: float
-    """rad/s"""
-    motor_decay: float
-    """exp(-t / tau) of half a step t."""
-    initial_speed: float
-    """rad/s, of every rotor."""
+    memory: FloatArray
+    """(ROWS * LANES,) beginning on a cache line: a vector across two lines costs twice."""
+    lanes: IntArray
+    """(LANES,) the rows that are flown."""
+    segments: IntArray
+    """(LANES,) the segments that they are in."""
+    keys: SeedArray
+    """(LANES,) of their noise."""
 
 
 class Results(NamedTuple):
@@ -73,36 +64,32 @@ class Results(NamedTuple):
     """(ticks, ROWS * LANES) the whole memory at each tick, before its command; or nothing."""
 
 
-def fly(first: int, last: int, plans: Plans, craft: Craft, results: Results) -> None:
+def fly(first: int, last: int, plans: Plans, craft: Craft, results: Results, scratch: Scratch) -> None:
     """Fly blocks `first` to `last` - 1 of LANES rows each; the last one is filled up with copies of the last row."""
-    memory = np.empty(ROWS * LANES)
-    lanes = np.empty(LANES, dtype=np.int64)
-    segments = np.empty(LANES, dtype=np.int64)
-    keys = np.empty(LANES, dtype=np.uint64)
+    memory, lanes, segments, keys = scratch
     for block in range(first, last):
+        memory[:] = 0.0
         for lane in range(LANES):
             lanes[lane] = plans.order[min(block * LANES + lane, len(plans.order) - 1)]
             segments[lane] = 0
             keys[lane] = key_of(plans.seeds[lanes[lane]])
-            start_lane(memory, lane, lanes[lane], plans, craft.initial_speed)
+            start_lane(memory, lane, lanes[lane], plans, craft)
             results.waypoint_errors[lanes[lane], 0] = 0.0
         fly_block(memory, lanes, segments, keys, plans, craft, results)
         for lane in range(LANES):
             finish_lane(memory, lane, lanes[lane], segments[lane], results)
 
 
-def start_lane(memory: FloatArray, lane: int, row: int, plans: Plans, rotor_speed: float) -> None:
-    """At rest on the plan's start, with every rotor at one speed."""
-    for r in range(ROWS):
-        memory[r * LANES + lane] = 0.0
+def start_lane(memory: FloatArray, lane: int, row: int, plans: Plans, craft: Craft) -> None:
+    """At rest on the plan's start, with every rotor at one speed; the lane's memory is zero."""
     yaw = plans.yaws_rad[row]
     for axis in range(3):
         memory[(rows.MOTION + axis) * LANES + lane] = plans.coefficients[row, axis, 0, 0]
     memory[(rows.MOTION + 8) * LANES + lane] = np.sin(0.5 * yaw)
     memory[(rows.MOTION + 9) * LANES + lane] = np.cos(0.5 * yaw)
     memory[(rows.PID + 8) * LANES + lane] = DEGREES * np.arctan2(np.sin(yaw), np.cos(yaw))
-    for rotor in range(4):
-        memory[(rows.SPEEDS + rotor) * LANES + lane] = rotor_speed
+    speed = craft.initial_speed
+    turn_rotors(memory, lane, (speed, speed, speed, speed), craft.air)
     for r in range(13):
         memory[(rows.SEEN + r) * LANES + lane] = memory[(rows.MOTION + r) * LANES + lane]
     segments = plans.durations_s.shape[1]
@@ -111,13 +98,14 @@ def start_lane(memory: FloatArray, lane: int, row: int, plans: Plans, rotor_spee
     memory[rows.GAP_START * LANES + lane] = plans.gaps[row, 0]
     memory[rows.GAP_END * LANES + lane] = plans.gaps[row, 1]
     memory[rows.ALIVE * LANES + lane] = 1.0
-    memory[rows.SEGMENT_LARGEST * LANES + lane] = -1.0
     load_segment(memory, lane, row, 0, plans)
 
 
 def load_segment(memory: FloatArray, lane: int, row: int, segment: int, plans: Plans) -> None:
     """Bring a segment's polynomials into the lane."""
     memory[rows.SEGMENT_START * LANES + lane] = plans.knots_s[row, segment]
+    memory[rows.END_TICK * LANES + lane] = plans.end_ticks[row, segment]
+    memory[rows.SEGMENT_LARGEST * LANES + lane] = -1.0
     for axis in range(4):
         for k in range(8):
             at = (rows.COEFFICIENTS + 8 * axis + k) * LANES + lane
@@ -134,43 +122,23 @@ def fly_block(
     results: Results,
 ) -> None:
     """Tick after tick: fly under the last command, sample the reference, judge, command."""
-    next_knot = pass_knots(memory, lanes, segments, 0, plans, results)
+    knot = next_knot(memory)
     tick = 0
     while any_runs(memory, tick):
+        if tick >= knot:
+            for lane in range(LANES):
+                remember(memory, lane)
         if tick > 0:
             fly_tick(memory, keys, tick, craft)
-        if tick >= next_knot:
-            next_knot = pass_knots(memory, lanes, segments, tick, plans, results)
-        for lane in range(LANES):
-            look(memory, lane, float(tick))
-            refer(memory, lane, float(tick))
-        for lane in range(LANES):
-            judge(memory, lane, float(tick))
-            count_clips(memory, lane, float(tick))
+        if tick >= knot:
+            pass_knots(memory, lanes, segments, tick, plans, results)
+            knot = next_knot(memory)
+        judge_tick(memory, tick)
         if tick < len(results.trace):
-            results.trace[tick] = memory
-        if craft.flight_loop:
-            for lane in range(LANES):
-                command_attitude(memory, lane, craft.law, craft.onboard)
-        else:
-            for lane in range(LANES):
-                command_rotors(memory, lane, craft.law, craft.air)
+            for number in range(ROWS * LANES):
+                results.trace[tick, number] = memory[number]
+        command_tick(memory, tick, craft, plans.has_gaps)
         tick += 1
-
-
-def fly_tick(memory: FloatArray, keys: SeedArray, tick: int, craft: Craft) -> None:
-    """Ten milliseconds of flight under the setpoint or the command given last, then the motors' noise."""
-    for lane in range(LANES):
-        remember(memory, lane)
-    for _ in range(craft.steps):
-        if craft.flight_loop:
-            for lane in range(LANES):
-                stabilise(memory, lane, craft.air, craft.onboard)
-        for lane in range(LANES):
-            advance(memory, lane, craft.air, craft.step_s, craft.motor_decay)
-    if craft.motor_noise > 0.0:
-        for lane in range(LANES):
-            disturb(memory, lane, keys[lane], np.uint64(tick), craft.air, craft.motor_noise)
 
 
 def any_runs(memory: FloatArray, tick: int) -> bool:
@@ -181,21 +149,25 @@ def any_runs(memory: FloatArray, tick: int) -> bool:
     return runs
 
 
+def next_knot(memory: FloatArray) -> float:
+    """The first tick at which any lane reaches the end of its segment."""
+    first = np.inf
+    for lane in range(LANES):
+        first = min(first, memory[rows.END_TICK * LANES + lane])
+    return first
+
+
 def pass_knots(
     memory: FloatArray, lanes: IntArray, segments: IntArray, tick: int, plans: Plans, results: Results
-) -> int:
-    """Take the lanes that reached a knot into their next segment; return the tick of the next knot of any lane."""
-    count = plans.durations_s.shape[1]
-    next_end = 1 << 62
+) -> None:
+    """Take the lanes that reached the end of their segment into their next one."""
     for lane in range(LANES):
-        row = lanes[lane]
-        alive = memory[rows.ALIVE * LANES + lane] > 0.0
-        while alive and segments[lane] < count and tick >= plans.end_ticks[row, segments[lane]]:
-            pass_knot(memory, lane, row, segments[lane], tick, plans, results)
-            segments[lane] += 1
-        if alive and segments[lane] < count:
-            next_end = min(next_end, plans.end_ticks[row, segments[lane]])
-    return next_end
+        while tick >= memory[rows.END_TICK * LANES + lane]:
+            if memory[rows.ALIVE * LANES + lane] > 0.0:
+                pass_knot(memory, lane, lanes[lane], segments[lane], tick, plans, results)
+                segments[lane] += 1
+            else:
+                memory[rows.END_TICK * LANES + lane] = np.inf
 
 
 def pass_knot(memory: FloatArray, lane: int, row: int, segment: int, tick: int, plans: Plans, results: Results) -> None:
@@ -208,10 +180,10 @@ def pass_knot(memory: FloatArray, lane: int, row: int, segment: int, tick: int, 
             target = target * plans.durations_s[row, segment] + plans.coefficients[row, axis, segment, k]
         total += (between(memory, lane, axis, share) - target) ** 2
     results.waypoint_errors[row, segment + 1] = np.sqrt(total)
+    memory[rows.END_TICK * LANES + lane] = np.inf
     if segment + 1 < plans.durations_s.shape[1]:
         largest = memory[rows.SEGMENT_LARGEST * LANES + lane]
         results.segment_largest[row, segment] = largest if largest >= 0.0 else np.nan
-        memory[rows.SEGMENT_LARGEST * LANES + lane] = -1.0
         load_segment(memory, lane, row, segment + 1, plans)
 
 

@@ -57,17 +57,39 @@ def test_noise_is_standard_normal() -> None:
     assert np.abs(cumulative - np.arange(len(cumulative)) * (count // 1000) / count).max() < 2.0 / math.sqrt(count)
     assert abs(flat.mean()) < 4.0 / math.sqrt(count)
     assert abs(flat.var() - 1.0) < 6.0 / math.sqrt(count)
-    assert abs((flat**4).mean() - 3.0) < 0.1
+    assert abs((flat**3).mean()) < 4.0 * math.sqrt(15.0 / count)
+    assert abs((flat**4).mean() - 3.0) < 4.0 * math.sqrt(96.0 / count)
     assert 4.0 < np.abs(flat).max() < 6.8
 
 
-def test_noise_is_not_correlated_within_a_pair_along_a_stream_or_between_neighbouring_seeds() -> None:
-    a, b = drawn(list(range(500)), 1000)[..., 0], drawn(list(range(500)), 1000)[..., 1]
-    bound = 4.0 / math.sqrt(a.size)
-    assert abs((a * b).mean()) < bound
-    assert abs((a[:, 1:] * a[:, :-1]).mean()) < bound
-    assert abs((a[1:] * a[:-1]).mean()) < bound
-    assert abs((a[1:, 1:] * a[:-1, :-1]).mean()) < bound
+@pytest.mark.parametrize("bound", [2.0, 3.0, 4.0, 4.5])
+def test_the_tails_of_noise_are_as_heavy_as_they_should_be(bound: float) -> None:
+    """Two million numbers, both sides counted apart: within four standard errors of a Poisson count."""
+    flat = drawn(list(range(1000, 2000)), 1000).ravel()
+    expected = len(flat) * 0.5 * math.erfc(bound / math.sqrt(2.0))
+    for beyond in ((flat > bound).sum(), (flat < -bound).sum()):
+        assert abs(beyond - expected) < 4.0 * math.sqrt(expected)
+
+
+def test_the_angle_of_a_pair_is_uniform() -> None:
+    """Made of a quarter turn and two signs: sixteen sectors, all alike, whatever the length."""
+    pairs = drawn(list(range(500)), 1000).reshape(-1, 2)
+    sector = np.floor(np.arctan2(pairs[:, 1], pairs[:, 0]) / (math.pi / 8.0)).astype(int) + 8
+    far = (pairs**2).sum(axis=1) > 2.0 * math.log(2.0)
+    for chosen in (sector[far], sector[~far]):
+        expected = len(chosen) / 16.0
+        assert ((np.bincount(chosen, minlength=16) - expected) ** 2 / expected).sum() < 45.0
+
+
+def test_noise_is_not_correlated_among_motors_along_a_stream_or_between_neighbouring_seeds() -> None:
+    """The four motors of a tick are outputs 2 t and 2 t + 1; sizes are held to it as well as values."""
+    numbers = drawn(list(range(500)), 1000).reshape(500, 500, 4)
+    for x in (numbers, (numbers**2 - 1.0) / math.sqrt(2.0)):
+        bound = 4.5 / math.sqrt(x[..., 0].size)
+        motors = np.einsum("stm,stn->mn", x, x) / x[..., 0].size
+        assert np.abs(motors - np.diag(np.diag(motors))).max() < bound
+        for earlier, later in ((x[:, :-1], x[:, 1:]), (x[:-1], x[1:]), (x[:-1, :-1], x[1:, 1:])):
+            assert np.abs(np.einsum("stm,stn->mn", earlier, later)).max() / earlier[..., 0].size < bound
 
 
 def by_the_book(seed: int, counter: int) -> tuple[float, float]:
@@ -82,8 +104,9 @@ def by_the_book(seed: int, counter: int) -> tuple[float, float]:
     key = mix((mix((seed + gamma) & whole) + 0x94D049BB133111EB) & whole)
     word = mix((key + (counter + 1) * gamma) & whole)
     radius = math.sqrt(-2.0 * math.log(((word >> 32) + 0.5) * 2.0**-32))
-    angle = 2.0 * math.pi * (word & (2**32 - 1)) * 2.0**-32
-    return radius * math.cos(angle), radius * math.sin(angle)
+    angle = 0.5 * math.pi * ((word & (2**30 - 1)) + 0.5) * 2.0**-30
+    signs = (-1.0 if word >> 31 & 1 else 1.0), (-1.0 if word >> 30 & 1 else 1.0)
+    return signs[0] * radius * math.cos(angle), signs[1] * radius * math.sin(angle)
 
 
 def test_the_generator_is_splitmix64_with_box_and_muller() -> None:

@@ -8,20 +8,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rotorpy.vehicles.multirotor import Multirotor
+from simulator_plans import LOPSIDED
 
 from lcd_flight.model import Vehicle
 from lcd_flight.worlds import load_vehicle
-from sim_bridge.kernels.multirotor import Motion, airframe, lagged, rates, rotor_sums, step
+from sim_bridge.kernels import rows
+from sim_bridge.kernels.lane import aim_rotors, fly_step, turn_rotors
+from sim_bridge.kernels.multirotor import (
+    Airframe,
+    Motion,
+    RotorSums,
+    Stage,
+    airframe,
+    lagged,
+    lagged_sums,
+    linear_sums,
+    rotor_sums,
+    slope_of,
+)
+from sim_bridge.kernels.rows import LANES, ROWS, load_motion, store_motion
 from sim_bridge.rotorpy_adapter import parameters
 
-LOPSIDED = replace(
-    load_vehicle("hummingbird"),
-    name="lopsided",
-    rotor_positions_m=((0.15, 0.1, 0.0), (0.11, -0.14, 0.0), (-0.1, -0.12, 0.0), (-0.13, 0.16, 0.0)),
-    k_flap=1e-6,
-    parasitic_drag=(0.1, 0.2, 0.3),
-)
-"""Nothing about it is symmetric, so no term can hide."""
 VEHICLES = [load_vehicle("crazyflie"), load_vehicle("hummingbird"), LOPSIDED]
 
 
@@ -30,6 +37,10 @@ def random_motion(rng: np.random.Generator) -> Motion:
     (vx, vy, vz), (wx, wy, wz), (qx, qy, qz, qw) = 4.0 * rng.normal(size=3), 5.0 * rng.normal(size=3), q
     size = math.sqrt(float(q @ q))
     return Motion((0.0, 0.0, 0.0), (vx, vy, vz), (qx / size, qy / size, qz / size, qw / size), (wx, wy, wz))
+
+
+def sums_at(speeds: tuple[float, float, float, float], air: Airframe) -> RotorSums:
+    return rotor_sums(speeds, linear_sums(speeds, air), air)
 
 
 @pytest.mark.parametrize("vehicle", VEHICLES, ids=lambda v: v.name)
@@ -41,9 +52,10 @@ def test_time_derivatives_are_rotorpys(vehicle: Vehicle) -> None:
         speeds = tuple(float(s) for s in rng.uniform(0.0, vehicle.rotor_speed_max, 4))
         packed = np.concatenate([motion.p_WB, motion.v_WB_W, motion.q_WB, motion.w_WB_B, np.zeros(3), speeds])
         expected = theirs._s_dot_fn(0.0, packed, np.array(speeds))
-        ours = rates(motion.v_WB_W, motion.q_WB, motion.w_WB_B, rotor_sums(speeds, air), air)
+        stage = Stage(motion.v_WB_W, motion.q_WB, motion.w_WB_B)
+        ours = slope_of(stage, sums_at(speeds, air), air, air.lifts)
         assert np.allclose(ours.v, expected[3:6], rtol=1e-10, atol=1e-10)
-        assert np.allclose(ours.q, expected[6:10], rtol=1e-10, atol=1e-10)
+        assert np.allclose(0.5 * np.array(ours.q_twice), expected[6:10], rtol=1e-10, atol=1e-10)
         assert np.allclose(ours.w, expected[10:13], rtol=1e-9, atol=1e-8)
 
 
@@ -62,18 +74,32 @@ def test_motors_approach_their_command_exponentially() -> None:
     assert whole[1] == 100.0
 
 
+def test_what_the_rotors_add_up_to_lags_as_they_do() -> None:
+    air = airframe(LOPSIDED)
+    speeds, commands = (500.0, 800.0, 600.0, 700.0), (1800.0, 0.0, 1750.0, 1850.0)
+    later = linear_sums(lagged(speeds, commands, 0.3), air)
+    assert lagged_sums(linear_sums(speeds, air), linear_sums(commands, air), 0.3) == pytest.approx(later)
+
+
+def test_only_some_vehicles_need_the_terms_of_translational_lift() -> None:
+    """Those that have none are computed without; with them it comes out the same."""
+    air = airframe(VEHICLES[0])
+    assert [airframe(v).lifts for v in VEHICLES] == [False, True, True]
+    motion = random_motion(np.random.default_rng(1))
+    stage, rotors = Stage(motion.v_WB_W, motion.q_WB, motion.w_WB_B), sums_at((900.0, 800.0, 700.0, 600.0), air)
+    assert slope_of(stage, rotors, air, True) == slope_of(stage, rotors, air, False)
+
+
 def flown(h: float) -> Motion:
     """0.4 s of tumbling with rotors that spin up, in steps of h."""
-    vehicle = VEHICLES[0]
-    air, tau = airframe(vehicle), 0.05
-    motion = random_motion(np.random.default_rng(3))
-    speeds, commands = (500.0, 800.0, 600.0, 700.0), (1800.0, 1700.0, 1750.0, 1850.0)
+    air, tau = airframe(LOPSIDED), 0.05
+    memory = np.zeros(ROWS * LANES)
+    store_motion(memory, rows.MOTION, 0, random_motion(np.random.default_rng(3)))
+    turn_rotors(memory, 0, (200.0, 500.0, 300.0, 400.0), air)
+    aim_rotors(memory, 0, (500.0, 480.0, 490.0, 510.0), air)
     for _ in range(round(0.4 / h)):
-        middle = lagged(speeds, commands, math.exp(-0.5 * h / tau))
-        end = lagged(middle, commands, math.exp(-0.5 * h / tau))
-        motion = step(motion, rotor_sums(speeds, air), rotor_sums(middle, air), rotor_sums(end, air), air, h)
-        speeds = end
-    return motion
+        fly_step(memory, 0, air, h, math.exp(-0.5 * h / tau))
+    return load_motion(memory, rows.MOTION, 0)
 
 
 def test_steps_converge_with_order_four() -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.campaign_crazyflie_fuzz import crazyflie_fuzz
+from benchmarks.campaign_sigkill import killed_flights
 from lcd_flight import api
 from lcd_flight.learning.sampling import first_tasks
 from lcd_flight.mission.task_mission import task_mission
@@ -80,6 +81,7 @@ def _word(verdict: dict[str, Any]) -> str:
 CAMPAIGNS: dict[str, Callable[[], dict[str, Any]]] = {
     "rehearsed-tasks": rehearsed_tasks,
     "crazyflie-fuzz": crazyflie_fuzz,
+    "killed-flights": killed_flights,
 }
 
 

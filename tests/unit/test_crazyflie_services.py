@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import zlib
+
 import pytest
 from virtual_crazyflie import ARMED, AUTO_ARM, CAN_FLY, Client
 
@@ -57,12 +59,14 @@ def test_older_firmware_has_no_supervisor_port_and_arms_by_the_platforms(client:
 
 
 def test_the_tables_of_contents_are_the_simulations_own() -> None:
-    """A client caches tables by checksum alone: two vehicles of ours share one, and it is that of this table."""
+    """A client caches tables by checksum alone: ours share one, and no plain checksum of the same table is equal."""
     (first,), (again,) = Client().ask("2C 03"), Client().ask("2C 03")
     assert first == again
     assert first[4:] == Client().vehicle.firmware.parameters.checksum.to_bytes(4, "little")
     (logs,) = Client().ask("5C 03")
     assert logs[4:8] != first[4:8]
+    items = [Client().ask(b"\x2c\x02" + number.to_bytes(2, "little"))[0][4:] for number in range(first[2])]
+    assert int.from_bytes(first[4:], "little") != zlib.crc32(b"".join(items))
 
 
 def test_every_entry_of_both_tables_can_be_asked_for(client: Client) -> None:

@@ -14,7 +14,7 @@ from lcd_flight.cli.terminal import LINE_PERIOD_S, Terminal
 from lcd_flight.errors import InputError, Outcome
 
 if TYPE_CHECKING:
-    from lcd_flight.learning.reproduce import StageProgress
+    from lcd_flight.learning.stages import StageProgress
 
 
 def reproduce(

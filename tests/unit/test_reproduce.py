@@ -98,38 +98,6 @@ def test_the_command_is_the_one_that_makes_it_again():
     assert replace(SETTINGS, per_drag=True).command == "lcd reproduce --recipe medium --per-drag"
 
 
-class Clock:
-    """Time that passes when told to."""
-
-    def __init__(self):
-        self.now_s = 100.0
-
-    def monotonic(self):
-        return self.now_s
-
-
-def test_the_time_that_is_left_follows_the_pace(monkeypatch):
-    """10 s were expected and 20 taken, so the next 30 will take 60; what was found done tells nothing of the pace."""
-    clock, told = Clock(), []
-    monkeypatch.setattr(reproduce_module, "time", clock)
-    stages = reproduce_module._Clock([10.0, 100.0, 30.0], told.append)
-    with stages.stage("first"):
-        clock.now_s += 20.0
-    with stages.stage("found"):
-        clock.now_s += 0.1
-    with stages.stage("last") as report:
-        assert told[-1].seconds_left == pytest.approx(60.0)
-        clock.now_s += 15.0
-        report(None)
-    assert told[-1].seconds_left == pytest.approx(45.0)
-    assert [(p.stage, p.stages, p.name) for p in told] == [
-        (1, 3, "first"),
-        (2, 3, "found"),
-        (3, 3, "last"),
-        (3, 3, "last"),
-    ]
-
-
 @pytest.fixture(scope="module")
 def light():
     """Every method is minimum snap, every training a file: the course of a reproduction without its work."""

@@ -188,6 +188,27 @@ def test_a_wait_on_the_ground_is_not_shown() -> None:
     assert timeline(log).axis.low == pytest.approx(60.2 - 2.0)
 
 
+def test_every_time_axis_has_phases_findings_and_gaps() -> None:
+    gap = Finding("pose_gap", Severity.WARN, "pose gap 42 ms (limit 300 ms)")
+    pairs = synthetic_flight.with_finding(synthetic_flight.flight(), 500, 504, gap)
+    html = page(log_of([pair for pair in pairs if not 600 <= pair[1].sequence < 650]))
+    charts = re.findall(r"<svg [^>]*data-low.*?</svg>", html, re.DOTALL)
+    assert len(charts) >= 20
+    for chart in charts:
+        assert chart.count('class="band trajectory"') == 1
+        assert chart.count('class="flag warn"') == 1
+        assert chart.count('class="band missing"') == 1
+
+
+def test_saturation_shades_thrust_and_motors() -> None:
+    pairs = [(i, replace(t, saturated=400 <= t.sequence < 450)) for i, t in synthetic_flight.flight()]
+    html = page(log_of(pairs))
+    (rect, again) = re.findall(r"<rect [^>]*saturated[^>]*>", html)
+    assert rect == again
+    width = float(re.search(r' width="([\d.]+)"', rect)[1])  # type: ignore[index]
+    assert width / 2000 * 9.7 == pytest.approx(0.5, abs=0.02)
+
+
 def test_every_chart_shares_the_flights_time(log: FlightLog) -> None:
     for panel in panels(log):
         for chart in panel.charts:

@@ -161,13 +161,18 @@ def following(terminal: Terminal, label: str) -> Iterator[Callable[[Progress], N
         nonlocal shown_s
         if time.monotonic() - shown_s >= LINE_PERIOD_S:
             shown_s = time.monotonic()
-            terminal.line(label, f"{progress.done:,}/{progress.total:,} {_rate(progress)}")
+            terminal.line(label, f"{progress.done:,}/{progress.total:,} {_rate(progress)}{_left(progress)}")
 
     yield show
 
 
 def _rate(progress: Progress) -> str:
     return f"{progress.unit} {progress.note}  {progress.rate:,.0f}/s"
+
+
+def _left(progress: Progress) -> str:
+    """How long it will take, where that is known."""
+    return "" if progress.seconds_left is None else f", {progress.seconds_left:,.0f} s left"
 
 
 def _plain(value: Any) -> Any:

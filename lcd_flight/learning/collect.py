@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -70,11 +70,12 @@ def fill(
         meter.begin(sum(min(manifest.rows(job.number), job.rows) for job in jobs))
         missing = [job for job in jobs if manifest.rows(job.number) < job.rows]
         try:
-            for job, made in spread(_Signed(make), missing):
-                fresh = job.rows - manifest.rows(job.number)
-                dataset.write(job.number, made.rollouts, made.checked())
-                manifest.add(job.number)
-                meter.advance(fresh, note or f"shard {job.number + 1} of {len(jobs)}")
+            with closing(spread(_Signed(make), missing)) as shards:
+                for job, made in shards:
+                    fresh = job.rows - manifest.rows(job.number)
+                    dataset.write(job.number, made.rollouts, made.checked())
+                    manifest.add(job.number)
+                    meter.advance(fresh, note or f"shard {job.number + 1} of {len(jobs)}")
         finally:
             with suppress(InputError):  # where a disk is full, what was wrong first is to be told
                 manifest.write()

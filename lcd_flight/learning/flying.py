@@ -9,6 +9,7 @@ import numpy as np
 from lcd_flight.learning.collect_config import CollectConfig
 from lcd_flight.learning.rebuild import trajectories
 from lcd_flight.learning.rollouts import Plans, Rollouts
+from lcd_flight.learning.spread import still_wanted
 from lcd_flight.model import (
     IntArray,
     RolloutLabels,
@@ -36,6 +37,7 @@ class DragByRow:
         self, plans: Trajectories, vehicle: Vehicle, seeds: SeedArray, options: RolloutOptions
     ) -> RolloutLabels:
         """As `model.Simulator`; no gaps in the pose."""
+        still_wanted()
         groups = [np.flatnonzero(self.drag == drag) for drag in range(1, len(self.configurations) + 1)]
         labels = [
             self.simulator.rollout(plans.take(rows), replace(vehicle, parasitic_drag=c), seeds[rows], options)

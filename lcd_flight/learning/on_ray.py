@@ -6,7 +6,7 @@ Every part is a task of its own; Ray gives the tasks of a node that dies to othe
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from typing import Any
 
 from lcd_flight.errors import LcdError
@@ -26,7 +26,7 @@ def on_ray(address: str) -> Spread:
     """
     ray = require_ray()
 
-    def spread(work: Callable[[Part], Result], parts: Sequence[Part]) -> Iterator[tuple[Part, Result]]:
+    def spread(work: Callable[[Part], Result], parts: Sequence[Part]) -> Generator[tuple[Part, Result], None, None]:
         if not parts:
             return
         _connect(ray, address)
@@ -47,7 +47,9 @@ def _connect(ray: Any, address: str) -> None:
         ) from error
 
 
-def _results(ray: Any, work: Callable[[Part], Result], parts: Sequence[Part]) -> Iterator[tuple[Part, Result]]:
+def _results(
+    ray: Any, work: Callable[[Part], Result], parts: Sequence[Part]
+) -> Generator[tuple[Part, Result], None, None]:
     """Each part with its result, in order; a few tasks are always on their way."""
     task = ray.remote(num_cpus=1, max_retries=-1)(_do)
     shared = ray.put(work)

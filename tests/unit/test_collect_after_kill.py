@@ -12,14 +12,20 @@ from lcd_flight.learning.spread import in_threads
 from lcd_flight.plugins import simulator
 from lcd_flight.worlds import load_world
 
-LCD = [sys.executable, "-c", "from lcd_flight.cli.main import lcd; lcd()"]
+CTRL_C = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+LCD = [sys.executable, "-c", f"{CTRL_C}; from lcd_flight.cli.main import lcd; lcd()"]
+"""Takes SIGINT as from a terminal, also where the tests run in the background, which ignores it."""
 SHARDS, ROWS = 8, 4_000
 COUNT = ["--count", str(SHARDS * ROWS), "--shard-rows", str(ROWS)]
 COLLECT = [*LCD, "collect", "--world", "crazyflie-saturated", "--sources", "optimum=1", *COUNT]
 
 
 def begin(folder):
-    return subprocess.Popen([*COLLECT, "--out", str(folder), "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    return subprocess.Popen(
+        [*COLLECT, "--out", str(folder), "--json"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
 
 
 def shards(folder):

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from lcd_flight.learning.spread import cores, in_threads, in_turn
+from lcd_flight.learning.spread import NoLongerWantedError, cores, in_threads, in_turn, still_wanted
 
 
 def test_results_come_in_order_whoever_is_first():
@@ -45,6 +45,26 @@ def test_what_has_not_begun_is_let_go_of():
     with pytest.raises(KeyError):
         list(in_threads(1)(work, range(100)))
     assert len(begun) <= 4
+
+
+def test_long_work_ends_soon_once_nobody_waits_for_it():
+    ends = []
+
+    def long_work(part):
+        for _ in range(10_000):
+            try:
+                still_wanted()
+            except NoLongerWantedError:
+                ends.append(part)
+                raise
+            time.sleep(0.001)
+
+    results = in_threads(2)(lambda part: part if part == 0 else long_work(part), range(9))
+    assert next(results) == (0, 0)
+    results.close()
+    assert set(ends) <= {1, 2, 3}
+    assert ends
+    still_wanted()
 
 
 def test_there_is_a_core():

@@ -118,7 +118,8 @@ def _write(
 
     if out is not None:
         api.save_plan(flight, out)
-        terminal.detail(f"plan     {out} (fly it: lcd-fly MISSION --plan {out})")
+        where = flight.mission.source.path or "MISSION"
+        terminal.detail(f"plan     {out} (fly it: lcd-fly {where} --plan {out})")
     if html is not None:
         from lcd_flight.review.plan_page import write_plan_page
 

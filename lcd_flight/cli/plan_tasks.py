@@ -49,7 +49,7 @@ def plan_tasks(
         plans = plan_all(given, planning, out, plugins.simulator(), progress)
     fell_back = int(plans.fell_back.sum())
     segments = plans.trajectories.segments
-    terminal.line("PLAN", f"{len(given):,} tasks of {segments} segments by {method} for {world}: {out}")
+    terminal.line("PLAN", f"{len(given):,} task(s) of {segments} segments by {method} for {world}: {out}")
     if fell_back:
         terminal.warn(f"{fell_back} of {len(given)} tasks: the solve found nothing better than minimum snap")
     facts = {"tasks": len(given), "segments": segments, "method": method, "fell_back": fell_back, "out": str(out)}

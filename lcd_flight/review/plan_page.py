@@ -22,6 +22,7 @@ _STYLE = """
 .picture { margin: 0 0 14px; padding: 0; overflow: hidden; break-inside: avoid; }
 .picture svg { display: block; width: 100%; height: auto; max-width: 640px; margin: 0 auto; }
 .pictures { columns: 2 400px; column-gap: 14px; margin: 14px 0; }
+td:first-child { white-space: normal; }
 polyline.bar { stroke-linecap: butt; }
 polyline { vector-effect: none; }
 """

@@ -79,6 +79,7 @@ def test_minimum_snap_alone_is_not_shown_beside_itself() -> None:
     page = page_of(planned(mission(planner={"type": "minimum-snap"})))
     assert page.count("svg") == 4
     assert page.texts.count("minimum snap") == 5  # the table and four legends, once each
+    assert "minimum-snap" not in page.texts
 
 
 def test_a_plan_from_a_file_says_so(tmp_path: Path) -> None:

@@ -12,6 +12,8 @@ class KnownSimulator:
 
     broken_from: error in m from which a rollout leaves the model's validity.
     interrupted_in: the call, counted from 1, in which Ctrl-C comes.
+
+    Calls are kept, but for those of one thread: flights that only try a method out.
     """
 
     def __init__(self, broken_from: float | None = None, interrupted_in: int | None = None) -> None:
@@ -19,9 +21,10 @@ class KnownSimulator:
         self.calls: list = []
 
     def rollout(self, plans, vehicle, seeds, options):
-        if len(self.calls) + 1 == self.interrupted_in:
+        if options.threads != 1 and len(self.calls) + 1 == self.interrupted_in:
             raise KeyboardInterrupt
-        self.calls.append((plans, vehicle, seeds, options))
+        if options.threads != 1:
+            self.calls.append((plans, vehicle, seeds, options))
         n, segments = plans.durations_s.shape
         error = np.abs(plans.coefficients[:, 0, 0, 0])
         waypoint = np.tile(error[:, None], (1, segments + 1)) * 0.5

@@ -107,15 +107,18 @@ def _vehicle(world: World, drag: int) -> Vehicle:
 
 
 def refusals(methods: Sequence[str], problem: Problem) -> dict[str, InputError]:
-    """Methods that cannot plan a problem's first task, and why. Loads kernels and models too, before any clock.
+    """Methods that cannot plan and fly a problem's first task, and why. Loads kernels and models, before any clock.
 
     Raises:
         InputError: there is no method of a name.
     """
     found = {}
     for name, method in {name: find_method(name) for name in methods}.items():
+        first = problem.take(np.arange(1))
         try:
-            method(problem.take(np.arange(1)))
+            planned = method(first)
+            options = replace(rollouts_of(first, planned), threads=1)
+            first.simulator.rollout(planned.plans, first.vehicle, np.zeros(1, np.uint64), options)
         except InputError as error:
             found[name] = error
     return found

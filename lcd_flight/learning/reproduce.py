@@ -6,20 +6,21 @@ trainings as `train` does, evaluations method by method and drag by drag.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from lcd_flight.learning.evaluate import evaluate, tasks_of
+from lcd_flight.learning.evaluate import evaluate, problem_of, refusals, tasks_of
 from lcd_flight.learning.evaluation import Evaluation, EvaluationOptions
 from lcd_flight.learning.evaluation_files import Parts
 from lcd_flight.learning.experiments import Experiment, Group, experiments
 from lcd_flight.learning.progress import ProgressCallback
 from lcd_flight.learning.recipes import TrainConfig
-from lcd_flight.learning.reproduction_models import model_name, trainings
+from lcd_flight.learning.reproduction_models import BASELINES, model_name, trainings
 from lcd_flight.learning.reproduction_settings import DRAGS, ReproduceSettings
 from lcd_flight.learning.stages import Stage, StageCallback, Stages
 from lcd_flight.learning.train import train
-from lcd_flight.model import Simulator
+from lcd_flight.model import InputError, Simulator
 from lcd_flight.planning.cost.model_file import SUFFIX
 
 _BOOK = "seconds.json"
@@ -57,6 +58,9 @@ def reproduce(settings: ReproduceSettings, work: Path, simulator: Simulator, pro
     models, tables = trainings(settings), experiments(settings)
     stages = Stages([*map(_training, models), *(_flights(settings, e) for e in tables)], work / _BOOK, progress)
     shop = _Shop(settings, work, simulator)
+    for experiment in tables:
+        if experiment.group == "paper":
+            shop.check(experiment)
     for number, config in enumerate(models):
         with stages.run(number) as report:
             shop.train(config, report)
@@ -75,6 +79,17 @@ class _Shop:
     work: Path
     simulator: Simulator
 
+    def check(self, experiment: Experiment) -> None:
+        """Try out what needs no model of this run, so that nothing is refused after an hour of training.
+
+        Raises:
+            InputError: a method cannot be flown.
+        """
+        waits = (*BASELINES, "learned", "learned-polished") if experiment.trained else ()
+        names = [name for name in experiment.methods if name not in waits]
+        for error in self._refusals(experiment, experiment.options, names).values():
+            raise error
+
     def train(self, config: TrainConfig, report: ProgressCallback) -> None:
         """Make a model, or find it made."""
         folder = self.work / "training" / config.name
@@ -90,6 +105,13 @@ class _Shop:
         single = [replace(options, drags=(d,), model=self._model(experiment, (d,))) for d in options.drags]
         return Evaluation.beside([self._flown(experiment, o, report) for o in single])
 
+    def _refusals(
+        self, experiment: Experiment, options: EvaluationOptions, methods: Sequence[str]
+    ) -> dict[str, InputError]:
+        """Methods that cannot be flown there, and why."""
+        one = tasks_of(experiment.world, 1, options)
+        return refusals(methods, problem_of(experiment.world, one, self.simulator, options, options.drags[0]))
+
     def _model(self, experiment: Experiment, drags: tuple[int, ...]) -> str:
         return str(self._path(model_name(self.settings, experiment.world, drags, experiment.recipe)))
 
@@ -99,7 +121,9 @@ class _Shop:
     def _flown(self, experiment: Experiment, options: EvaluationOptions, report: ProgressCallback) -> Evaluation:
         tasks = tasks_of(experiment.world, self.settings.count, options)
         parts = Parts.of(self.work / "flights", experiment.world, tasks, options, self.simulator)
-        return evaluate(experiment.world, experiment.methods, tasks, self.simulator, options, report, parts)
+        refused = self._refusals(experiment, options, experiment.methods) if experiment.group == "beyond" else {}
+        methods = [name for name in experiment.methods if name not in refused]
+        return evaluate(experiment.world, methods, tasks, self.simulator, options, report, parts)
 
 
 def _training(config: TrainConfig) -> Stage:

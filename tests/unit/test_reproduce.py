@@ -202,3 +202,30 @@ def test_what_the_page_points_to_is_there(course):
     targets = re.findall(r"\]\((\.\./[^)#\s]+)\)", page(course[0], []))
     assert targets
     assert [t for t in targets if not (ROOT / "docs" / "results" / t).resolve().exists()] == []
+
+
+def test_what_cannot_be_flown_is_told_before_anything_is_trained(light, tmp_path, monkeypatch):
+    def refuse(problem):
+        raise InputError("controller of tomorrow")
+
+    monkeypatch.setitem(METHODS, "search", refuse)
+    before = len(light)
+    with pytest.raises(InputError, match="controller of tomorrow"):
+        reproduce(QUICK, tmp_path, KnownSimulator(), lambda progress: None)
+    assert len(light) == before
+
+
+def test_beyond_the_paper_who_cannot_fly_is_left_out(light, tmp_path, monkeypatch):
+    minimum = METHODS["minimum-snap"]
+
+    def short_only(problem):
+        if problem.tasks.waypoints_m.shape[1] > 4:
+            raise InputError("four waypoints at most")
+        return minimum(problem)
+
+    monkeypatch.setitem(METHODS, "search", short_only)
+    settings = replace(QUICK, count=2)
+    result = reproduce(settings, tmp_path, KnownSimulator(), lambda progress: None)
+    assert "search" not in result.evaluations["crazyflie-saturated-fixed-10-waypoints"].runs
+    assert "search" in result.evaluations["crazyflie-paper-retimed-yaw"].runs
+    assert "Empty: the method cannot plan or fly there" in page(result, [])

@@ -53,7 +53,10 @@ def _read(terminal: Terminal, path: Path) -> FlightLog:
         what = "is a folder" if path.is_dir() else "no such file"
         raise InputError(f"{path}: {what}; give the .mcap file of a flight: {remedy}")
     terminal.status(f"reading {path}, {path.stat().st_size / 1e6:.1f} MB")
-    return read_log(path)
+    log = read_log(path)
+    if not log.complete:
+        terminal.warn(f"{path} was cut: the end of the flight may be missing")
+    return log
 
 
 def _review(terminal: Terminal, flight: FlightLog, out: Path | None) -> int:
@@ -116,6 +119,8 @@ def _figures(flight: FlightLog) -> dict[str, Any]:
 
 def _text(value: object) -> str:
     """A figure for people."""
+    if value is None:
+        return "-"
     if isinstance(value, float):
         return f"{value:.4g}"
     if isinstance(value, list | tuple):

@@ -100,6 +100,17 @@ def test_what_is_wrong_is_said_with_its_remedy(
     assert "Traceback" not in told
 
 
+def test_a_cut_log_is_reviewed_and_told(
+    flights: list[Path], capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    whole = flights[0].read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) * 2 // 3])
+    code, facts, told = said(capsys, tmp_path / "cut.mcap")
+    assert (code, facts["outcome"], facts["flight_outcome"]) == (0, "ok", None)
+    assert "cut.mcap was cut" in told
+    assert "None" not in told
+
+
 def test_a_file_that_is_no_log_is_one_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     for content in (b"", b"hello", b"\x89MCAP0\r\n"):
         path = tmp_path / "x.mcap"

@@ -50,6 +50,8 @@ def crazyflie_fuzz(count: int = COUNT, seed: int = 2026) -> dict[str, Any]:
         _fuzz_one(vehicle, min(EACH, count - first), draws)
         if first < count / 10:
             settled_kB = _memory_kB()
+        if count > EACH:
+            print(f"{min(first + EACH, count):,}/{count:,} packets")  # noqa: T201
     return {
         "packets": count,
         "seed": seed,

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import math
 import signal
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -24,6 +25,8 @@ VEHICLE = "crazyflie-2.1"
 ENDPOINT = "tcp://127.0.0.1:5555"
 RIGID_BODY = "cf1"
 NOWHERE = "none"
+EVENTS = 1000
+"""As many of the last ones stand in the JSON line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +97,7 @@ def serve(
 
 async def _served(server: VehicleServer, bench: Bench, terminal: Terminal, seconds: float | None) -> dict[str, Any]:
     terminal.announce_compilation()
-    events: list[str] = []
+    events: deque[str] = deque(maxlen=EVENTS)
 
     def say(text: str) -> None:
         events.append(text)
@@ -105,7 +108,7 @@ async def _served(server: VehicleServer, bench: Bench, terminal: Terminal, secon
         if bench.endpoint != NOWHERE:
             terminal.detail(f"poses of {bench.rigid_body} at {bench.endpoint}")
         await _until_told(server, say, seconds)
-    return {"uri": server.uri, "vehicle": server.description, "events": events}
+    return {"uri": server.uri, "vehicle": server.description, "events": list(events)}
 
 
 async def _until_told(server: VehicleServer, say: Callable[[str], None], seconds: float | None) -> None:

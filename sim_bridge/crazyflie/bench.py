@@ -103,10 +103,11 @@ class Bench:
         self._tell()
 
     def _tell(self) -> None:
+        """The supervisor's state, where it is another than the last that was told: arming anew is no news."""
         state = self.vehicle.firmware.supervisor.state
-        if state is not self._told:
+        if state is not self._told and state in _STATES:
             self._told = state
-            self._said.extend([_STATES[state]] if state in _STATES else [])
+            self._said.append(_STATES[state])
 
     @staticmethod
     def _is_due(since_ns: int | None, after_s: float | None, now_ns: int) -> bool:

@@ -59,6 +59,12 @@ def test_without_faults_everything_arrives_at_once() -> None:
     assert line.said == ["armed"]
 
 
+def test_arming_anew_every_half_minute_is_no_news() -> None:
+    line = Line()
+    line.wait(95_000.0)
+    assert line.said == ["armed"]
+
+
 def test_a_share_is_lost_each_way() -> None:
     line = Line(drop=0.1)
     answered = sum(line.send(PING) == [PING] for _ in range(2000))

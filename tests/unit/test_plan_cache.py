@@ -157,6 +157,16 @@ def test_bytes_are_bounded_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert sum(path.stat().st_size for path in kept(tmp_path)) <= 5000
 
 
+def test_polished_plans_are_kept_with_the_seed_of_their_noise(tmp_path: Path) -> None:
+    polished = {"type": "learned-polished", "speed": 1.5}
+    made = plan(tmp_path, planner=polished)
+    again, other = plan(tmp_path, planner=polished), plan(tmp_path, planner=polished, seed=1)
+    assert made.summaries[0].method == "learned-polished"
+    assert [p.summaries[0].cached for p in (made, again, other)] == [False, True, False]
+    assert np.array_equal(made.plan.joined().coefficients, again.plan.joined().coefficients)
+    assert not plan(tmp_path).summaries[0].cached  # the same without the polish is another plan
+
+
 def test_minimum_snap_is_not_kept(tmp_path: Path) -> None:
     plan(tmp_path, planner={"type": "minimum-snap"})
     assert not (tmp_path / "plans").exists()

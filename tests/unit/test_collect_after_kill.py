@@ -15,7 +15,7 @@ from lcd_flight.worlds import load_world
 CTRL_C = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
 LCD = [sys.executable, "-c", f"{CTRL_C}; from lcd_flight.cli.main import lcd; lcd()"]
 """Takes SIGINT as from a terminal, also where the tests run in the background, which ignores it."""
-SHARDS, ROWS = 8, 4_000
+SHARDS, ROWS = 40, 1_500
 COUNT = ["--count", str(SHARDS * ROWS), "--shard-rows", str(ROWS)]
 COLLECT = [*LCD, "collect", "--world", "crazyflie-saturated", "--sources", "optimum=1", *COUNT]
 
@@ -51,7 +51,7 @@ def contents(folder):
 
 def test_killed_three_times_and_interrupted_once(tmp_path):
     folder = tmp_path / "pieces"
-    for delay_s in (0.0, 0.05, 0.1):
+    for delay_s in (0.0, 0.02, 0.04):
         code, _ = stop_after_another_shard(folder, signal.SIGKILL, delay_s)
         assert code == -signal.SIGKILL
     code, out = stop_after_another_shard(folder, signal.SIGINT, 0.0)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import textwrap
 from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib import resources
@@ -61,7 +62,7 @@ def page(result: Reproduction, flights: list[str]) -> str:
     template = resources.files(__package__).joinpath(_TEMPLATE).read_text(encoding="utf-8")
     values = _values(result) | {"flights": "\n\n".join(flights)}
     flown = {name for experiment in result.in_group("paper") for name in experiment.methods}
-    paragraphs = (_filled(result, values, flown, text) for text in template.split("\n\n"))
+    paragraphs = (_wrapped(_filled(result, values, flown, text)) for text in template.split("\n\n"))
     return "\n\n".join(text.strip("\n") for text in paragraphs if text.strip()) + "\n"
 
 
@@ -88,6 +89,14 @@ def _filled(result: Reproduction, values: dict[str, str], flown: set[str], parag
         return values[kind]
 
     return _PLACE.sub(figure, paragraph)
+
+
+def _wrapped(paragraph: str) -> str:
+    """Prose in lines of even length, now that its figures are in; tables, pictures and titles as they are."""
+    if paragraph.startswith(("|", "!", "#")) or "\n|" in paragraph:
+        return paragraph
+    indent = "  " if paragraph.startswith("- ") else ""
+    return textwrap.fill(paragraph, 120, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
 
 
 def _values(result: Reproduction) -> dict[str, str]:

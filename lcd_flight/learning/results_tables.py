@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from lcd_flight.learning.evaluation import Evaluation, MethodFigures
 from lcd_flight.learning.experiments import TIMINGS
+from lcd_flight.learning.methods import METHODS
 from lcd_flight.learning.reproduce import Reproduction
 from lcd_flight.learning.reproduction_models import LESSON_WORLD
 from lcd_flight.learning.reproduction_settings import MIDDLE_DRAG, WORLDS
@@ -100,7 +101,7 @@ def all_figures(evaluation: Evaluation) -> str:
 def beyond(result: Reproduction) -> str:
     """Experiments beside the paper's, in the middle drag configuration: a row each, a column for each method."""
     chosen = result.in_group("beyond")
-    names = list(dict.fromkeys(name for e in chosen for name in e.methods))
+    names = [name for name in METHODS if any(name in result.evaluations[e.name].runs for e in chosen)]
     rows = []
     for experiment in chosen:
         found = result.evaluations[experiment.name].methods

@@ -210,6 +210,24 @@ def test_evaluation_never_sees_the_noise_of_training():
     assert not np.isin(Stream(1, "training/noise").seeds(rows.reshape(-1)), simulator.calls[0][2]).any()
 
 
+def test_no_method_that_flies_while_it_plans_ever_sees_the_noise_that_it_is_judged_by():
+    """Whatever task a seed was drawn for, and in both timings."""
+    for timing in ("fixed", "retimed"):
+        simulator = KnownSimulator()
+        found = evaluate(
+            WORLD,
+            ["search", "analytic-polished"],
+            6,
+            simulator,
+            EvaluationOptions(seed=1, timing=timing, noise_seeds=2),
+        )
+        judged = [call for call in simulator.calls if np.array_equal(call[2], found.noise.reshape(-1))]
+        others = np.concatenate([call[2] for call in simulator.calls if not np.array_equal(call[2], judged[0][2])])
+        assert len(judged) == 2
+        assert len(others) > 1000
+        assert not np.isin(found.noise, others).any()
+
+
 def test_the_json_table():
     run = evaluate(WORLD, ["minimum-snap"], tasks_with_errors([0.1, 2.0]), KnownSimulator())
     table = json.loads(json.dumps(run.as_json(), allow_nan=False))

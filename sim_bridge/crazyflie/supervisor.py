@@ -1,8 +1,9 @@
 """The firmware's supervisor: may it arm, may the motors turn, and when is it over. Time comes in as milliseconds.
 
-Source: crazyflie-firmware 2026.08, src/modules/src/supervisor.c (conditions, what a change of state does) and
-supervisor_state_machine.c (the table below); platform_defaults.h (the figures). It is updated at 25 Hz and changes its
-state at most once an update.
+Source: crazyflie-firmware, src/modules/src/supervisor.c (conditions, what a change of state does) and
+supervisor_state_machine.c (the table below, as it is since landing has a time-out); platform_defaults.h (the figures).
+The line of the pre-flight time-out follows from what supervisor.c does about it. Brushless motors' spin-up is left out.
+It is updated at 25 Hz and changes its state at most once an update.
 """
 
 from __future__ import annotations

@@ -96,7 +96,9 @@ def _wrapped(paragraph: str) -> str:
     if paragraph.startswith(("|", "!", "#")) or "\n|" in paragraph:
         return paragraph
     indent = "  " if paragraph.startswith("- ") else ""
-    return textwrap.fill(paragraph, 120, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+    return textwrap.fill(
+        " ".join(paragraph.split()), 120, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
+    )
 
 
 def _values(result: Reproduction) -> dict[str, str]:

@@ -229,3 +229,10 @@ def test_beyond_the_paper_who_cannot_fly_is_left_out(light, tmp_path, monkeypatc
     assert "search" not in result.evaluations["crazyflie-saturated-fixed-10-waypoints"].runs
     assert "search" in result.evaluations["crazyflie-paper-retimed-yaw"].runs
     assert "Empty: the method cannot plan or fly there" in page(result, [])
+
+
+def test_prose_stands_in_even_lines(course):
+    text = page(course[0], [])
+    prose = [line for line in text.splitlines() if not line.startswith(("|", "!", "#"))]
+    assert max(map(len, prose)) <= 120
+    assert not any("  " in line.strip() for line in prose)

@@ -7,7 +7,6 @@ import typer
 from lcd_flight.cli import sim_crazyflie
 
 app = typer.Typer(
-    no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,

@@ -14,6 +14,7 @@ from sim_bridge.crazyflie.variants import Variant
 _NULL_CHANNEL = 3
 _POWER = 0xFE
 _ALL_OFF, _OFF, _ON, _RESET = 0x01, 0x02, 0x03, 0xF0
+_TO_FIRMWARE = 1
 """Commands to the radio's own processor, which powers the other one (cflib, utils/power_switch.py)."""
 
 
@@ -92,9 +93,10 @@ class SimulatedCrazyflie:
         self._on = self.alive
 
     def _switch(self, command: bytes) -> None:
-        if command[:1] in (bytes((_ON,)), bytes((_RESET,))):
+        """The boot loader is as silent as a vehicle that is off."""
+        if command[:2] == bytes((_RESET, _TO_FIRMWARE)) or (command[:1] == bytes((_ON,)) and not self._on):
             self.reboot()
-        elif command[:1] in (bytes((_OFF,)), bytes((_ALL_OFF,))):
+        elif command[:1] in (bytes((_OFF,)), bytes((_ALL_OFF,)), bytes((_RESET,))):
             self._cut()
 
     def _cut(self) -> None:

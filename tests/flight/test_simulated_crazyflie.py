@@ -422,12 +422,19 @@ class TestReboot:
         client.take_off()
         assert client.height_m > 0.05
 
-    def test_switched_off_it_is_silent_until_it_is_switched_on(self, client: Client) -> None:
+    @pytest.mark.parametrize("off", ["FF FE 01", "FF FE 02", "FF FE F0 00"], ids=["all", "this", "boot loader"])
+    def test_switched_off_it_is_silent_until_it_is_switched_on(self, client: Client, off: str) -> None:
         client.wait(200.0)
-        assert client.ask("FF FE 02") == [bytes.fromhex("FF FE 02")]
+        assert client.ask(off) == [bytes.fromhex(off)]
         assert client.ask("FC 00") == []
         assert client.ask("FF FE 03") == [bytes.fromhex("FF FE 03")]
         assert client.ask("FC 00") == [bytes.fromhex("FC 00")]
+
+    def test_switching_on_what_is_on_changes_nothing(self, client: Client) -> None:
+        client.take_off()
+        client.ask("FF FE 03")
+        client.wait(100.0)
+        assert client.info & FLYING
 
 
 class TestWhatIsNotSimulated:

@@ -21,7 +21,7 @@ from lcd_flight.model import (
     World,
 )
 from lcd_flight.planning.cost.model_file import SUFFIX, check_fits, load_model
-from lcd_flight.planning.cost.proxy import ThrustProxy
+from lcd_flight.planning.cost.proxy import ANALYTIC_SNAP_WEIGHT, ThrustProxy
 from lcd_flight.planning.cost.tracking_cost import CostModel
 from lcd_flight.planning.knots import Whitening
 from lcd_flight.planning.minimum_snap import minimum_snap_batch
@@ -123,7 +123,7 @@ def analytic(problem: Problem) -> Planned:
 
 def analytic_long(problem: Problem) -> Planned:
     """The same with ten times the iterations: no less processor time than `learned` takes."""
-    return _solved(_solve(problem, ThrustProxy(), PlannerOptions(problem.timing, iterations=400)))
+    return _solved(_solve(problem, ThrustProxy(), PlannerOptions(problem.timing, ANALYTIC_SNAP_WEIGHT, iterations=400)))
 
 
 def learned(problem: Problem) -> Planned:
@@ -178,7 +178,7 @@ def _fitting(problem: Problem, name: str) -> CostModel:
 
 
 def _solve_analytic(problem: Problem) -> PlanResult:
-    return _solve(problem, ThrustProxy(), PlannerOptions(problem.timing))
+    return _solve(problem, ThrustProxy(), PlannerOptions(problem.timing, ANALYTIC_SNAP_WEIGHT))
 
 
 def _solve(problem: Problem, cost: TrackingCost, options: PlannerOptions) -> PlanResult:

@@ -33,7 +33,7 @@ class TrainConfig:
     """Planned in each round, of all worlds together, up to whole blocks of `policy`."""
     members: int = 1
     """Of the last model; those before it only propose plans, and have one."""
-    snap_weight: float = 0.1
+    snap_weight: float = 0.03
     drags: tuple[int, ...] = (1, 2, 3, 4, 5)
     inputs: InputsName = "windows"
     """What the networks see; all but windows tie a model to the worlds' number of waypoints."""

@@ -16,7 +16,7 @@ from lcd_flight.mission.assemble import TrajectoryTask
 from lcd_flight.mission.plan_key import model_hash
 from lcd_flight.mission.solution import MINIMUM_SNAP, ModelStamp, Option, Predictions, Solution
 from lcd_flight.model import FloatArray, RolloutOptions, Simulator, Trajectories, Trajectory, Vehicle
-from lcd_flight.planning.cost.proxy import ThrustProxy
+from lcd_flight.planning.cost.proxy import ANALYTIC_SNAP_WEIGHT, ThrustProxy
 from lcd_flight.planning.cost.tracking_cost import CostModel
 from lcd_flight.planning.knots import Whitening
 from lcd_flight.planning.minimum_snap import minimum_snap
@@ -94,6 +94,8 @@ class Solver:
         """Times that the mission gives are kept; a model's card knows the weight of snap that suits it."""
         timing: Timing = "fixed" if task.times_given else "retimed"
         options = PlannerOptions(timing=timing, cost_weight=self.weight)
+        if isinstance(self.cost, ThrustProxy):
+            return replace(options, snap_weight=ANALYTIC_SNAP_WEIGHT)
         card = self.cost.card if isinstance(self.cost, CostModel) else None
         return options if card is None else replace(options, snap_weight=card.snap_weight)
 
@@ -102,7 +104,7 @@ class Solver:
         space = Whitening.of(task.waypoints[None], task.durations_s[None])
         solved = [result]
         if not isinstance(self.cost, ThrustProxy):
-            analytic = PlannerOptions(timing=options.timing)
+            analytic = PlannerOptions(options.timing, ANALYTIC_SNAP_WEIGHT)
             solved.append(plan_task(task.waypoints, task.durations_s, ThrustProxy(), analytic))
         candidates = [Candidate(s.z, s.theta) for s in solved] + [Candidate.minimum_snap(space)]
         assert self.simulator is not None  # noqa: S101 - a method that polishes is made with one

@@ -1,24 +1,25 @@
-"""The projected solve: waypoints held exactly, tracking cost against extra snap, from minimum snap downhill.
+"""The projected solve: waypoints held exactly, tracking cost against extra snap, downhill from a good start.
 
     min over z, theta of   weight * cost(plan) + lambda |z|^2 + lambda / 2 |theta|^2,   plan = Whitening.plan(z, theta)
 
 This is the paper's problem 3 in variables that satisfy its constraints whatever they are, with its c'Hc counted
-relative to the least snap there is: |z|^2. Each row is solved by Adam from minimum snap (zeros), keeps its best
-iterate, and falls back to minimum snap, saying why, where that did not lead to a better plan. A row's plan depends on
-that row alone, to the bit.
+relative to the least snap there is: |z|^2. Each row is solved by Adam, first on the analytic cost from minimum snap
+(zeros), then on the given one from there (decision 0049). It keeps its best iterate, and falls back to minimum snap,
+saying why, where that did not lead to a better plan. A row's plan depends on that row alone, to the bit.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from itertools import chain
 from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
 from lcd_flight.model import BoolArray, FloatArray, InputError, IntArray, Tasks, Trajectories
+from lcd_flight.planning.cost.proxy import ANALYTIC_SNAP_WEIGHT, ThrustProxy
 from lcd_flight.planning.descent import descend
 from lcd_flight.planning.knots import Whitening
 from lcd_flight.planning.minimum_snap import snap
@@ -69,6 +70,8 @@ class PlannerOptions:
     iterations: int = 40
     step: float = 0.08
     """Adam's first step; it decays to zero along a cosine."""
+    start: Literal["analytic", "minimum-snap"] = "analytic"
+    """Where the solve begins; `analytic` is the same solve on the analytic cost, with as many iterations."""
 
     def __post_init__(self) -> None:
         """Refuse what no solve can use.
@@ -102,7 +105,7 @@ class PlanResult:
     relative_snap: FloatArray
     """(N,) snap of the position over the least possible at the durations as given."""
     best_iteration: IntArray
-    """(N,) the iterate that was kept; 0 is minimum snap."""
+    """(N,) the iterate that was kept; 0 is where the solve began, or minimum snap where it fell back."""
     z: FloatArray
     """(N, S - 1, 3, 4) what the solve found (`Whitening.plan`), also where it fell back: data for training."""
     theta: FloatArray
@@ -152,14 +155,26 @@ def plan_task(
 
 
 def _plan(whitening: Whitening, cost: TrackingCost, options: PlannerOptions) -> PlanResult:
+    """Solve; rows that come to nothing from the analytic start, once more from minimum snap."""
+    result = _solved(whitening, cost, options)
+    again = np.array([reason is not None for reason in result.fallback])
+    if options.start == "minimum-snap" or not again.any() or whitening.durations_s.shape[1] == 1:
+        return result
+    rows = np.flatnonzero(again)
+    return _patched(result, rows, _solved(whitening.take(rows), cost, replace(options, start="minimum-snap")))
+
+
+def _solved(whitening: Whitening, cost: TrackingCost, options: PlannerOptions) -> PlanResult:
     """Solve, then judge every row."""
     objective = PlanObjective(whitening, cost, options)
-    descent = descend(objective, np.zeros((len(whitening), objective.size)), options.iterations, options.step)
+    start = _start(whitening, cost, options, objective.size)
+    descent = descend(objective, start, options.iterations, options.step, safe_start=not start.any())
     z, theta = objective.unpack(descent.best)
     found, minimum = whitening.plan(z, theta), whitening.minimum
     before, after = _Judgement.of(cost, minimum), _Judgement.of(cost, found)
     strange = _strangeness(cost, whitening.plan(*objective.unpack(descent.last)))
-    verdicts = zip(descent.failed, after.below(before), descent.mistrusted, strange, strict=True)
+    improved = after.below(before) & descent.trusted
+    verdicts = zip(descent.failed, improved, descent.mistrusted, strange, strict=True)
     reasons = tuple(
         _why_not(segments=found.segments, failed=failed, improved=improved, mistrusted=mistrusted, strange=why)
         for failed, improved, mistrusted, why in verdicts
@@ -182,6 +197,15 @@ def _plan(whitening: Whitening, cost: TrackingCost, options: PlannerOptions) -> 
         theta=theta,
         fallback=reasons,
     )
+
+
+def _start(whitening: Whitening, cost: TrackingCost, options: PlannerOptions, size: int) -> FloatArray:
+    """(N, V) minimum snap, or what the analytic cost makes of it."""
+    zeros = np.zeros((len(whitening), size))
+    if options.start == "minimum-snap" or isinstance(cost, ThrustProxy):
+        return zeros
+    analytic = replace(options, snap_weight=ANALYTIC_SNAP_WEIGHT, cost_weight=1.0)
+    return descend(PlanObjective(whitening, ThrustProxy(), analytic), zeros, options.iterations, options.step).best
 
 
 class PlanObjective:
@@ -261,6 +285,20 @@ def _joined(parts: list[PlanResult]) -> PlanResult:
     """The blocks of a batch, one after another."""
     values = {f.name: _concatenated([getattr(part, f.name) for part in parts]) for f in fields(PlanResult)}
     return PlanResult(**values)
+
+
+def _patched(result: PlanResult, rows: IntArray, other: PlanResult) -> PlanResult:
+    """`result` with these rows taken from `other`."""
+    order = np.arange(len(result))
+    order[rows] = len(result) + np.arange(len(rows))
+    both = _joined([result, other])
+    return PlanResult(**{f.name: _taken(getattr(both, f.name), order) for f in fields(PlanResult)})
+
+
+def _taken(values: Any, order: IntArray) -> Any:
+    if isinstance(values, tuple):
+        return tuple(values[row] for row in order)
+    return values.take(order) if isinstance(values, Trajectories) else values[order]
 
 
 def _concatenated(parts: list[Any]) -> Any:

@@ -34,6 +34,9 @@ def _derivative_table(order: int) -> FloatArray:
 _UNIT_1, _UNIT_2, _UNIT_3 = _derivative_table(1), _derivative_table(2), _derivative_table(3)
 _MIDPOINTS = (np.arange(SAMPLES) + 0.5) / SAMPLES
 
+ANALYTIC_SNAP_WEIGHT = 0.05
+"""lambda that suits this cost (decision 0049)."""
+
 
 @dataclass(frozen=True, slots=True)
 class ThrustProxy:

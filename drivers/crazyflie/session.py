@@ -117,6 +117,8 @@ class Session(Crazyflie):  # type: ignore[misc]  # cflib is untyped
         """Close without a word to the vehicle, and leave no thread behind. Takes up to three seconds."""
         self.incoming.stop()
         if self.incoming.is_alive():
+            if self.link is not None:
+                self.link.in_queue.put(None)  # it waits there for up to a second
             self.incoming.join(_JOIN_S)
         with self._send_lock:
             link = self.link

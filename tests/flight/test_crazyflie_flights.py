@@ -14,7 +14,7 @@ import struct
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,7 +43,6 @@ class Flown:
 
     result: FlightResult
     listener: Listener
-    threads: set[threading.Thread]
 
     def first(self, code: str) -> tuple[TickInputs, Tick]:
         """The tick that had a finding first."""
@@ -117,89 +116,114 @@ class World:
         keys = {**self.keys, "vehicle": {**self.keys["vehicle"], "uri": self.path.uri}}
         mission = Mission.model_validate(keys)
         vehicle = vehicle_of(mission)
-        before = set(threading.enumerate())
 
         async def yes(_operator: object) -> bool:
             return True
 
-        result = run_flight(
-            mission, plan_mission(mission, vehicle).plan, vehicle, FlightOptions(confirm=yes), observers=(listener,)
-        )
-        return Flown(result, listener, set(threading.enumerate()) - before)
+        options = FlightOptions(confirm=yes)
+        plan = plan_mission(mission, vehicle).plan
+        return Flown(run_flight(mission, plan, vehicle, options, observers=(listener,)), listener)
 
 
-def in_track(act: object) -> Listener:
+def in_track(act: Callable[[], None]) -> Listener:
     """Acts once, when the first trajectory has begun."""
     acted: list[bool] = []
 
     def once(_inputs: TickInputs, tick: Tick) -> None:
         if tick.phase is Phase.TRACK and not acted:
             acted.append(True)
-            act()  # type: ignore[operator]
+            act()
 
     return Listener(act=once)
 
 
-@pytest.fixture
-def world(tmp_path: Path) -> Iterator[World]:
-    world = World(tmp_path)
+def lose_a_third(world: World) -> None:
+    """Each way."""
+    luck = random.Random(4)  # noqa: S311 - nothing is to be kept secret
+    world.path.loses = lambda _data, _up: luck.random() < 0.3
+
+
+def be_silent_for_three_seconds(world: World) -> None:
+    """Each way; poses go on."""
+    world.path.loses = lambda _data, _up: True
+    threading.Timer(3.0, setattr, (world.path, "loses", lambda _data, _up: False)).start()
+
+
+def kill(world: World) -> None:
+    """Vehicle and motion capture are gone at once."""
+    world.process.kill()
+
+
+FAULTS = {"lossy": lose_a_third, "silent": be_silent_for_three_seconds, "killed": kill}
+
+
+@pytest.fixture(scope="module")
+def faulty(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Flown]:
+    """A flight with each fault, side by side, to save time."""
+    flown: dict[str, Flown] = {}
+
+    def fly(name: str) -> None:
+        world = World(tmp_path_factory.mktemp(name))
+        with world.running():
+            flown[name] = world.fly(in_track(lambda: FAULTS[name](world)))
+
+    flights = [threading.Thread(target=fly, args=(name,), name=name) for name in FAULTS]
+    for flight in flights:
+        flight.start()
+    for flight in flights:
+        flight.join()
+    return flown
+
+
+def test_a_mission_lands_and_every_setpoint_is_in_the_log_as_it_went_out(tmp_path: Path) -> None:
+    world, before = World(tmp_path), set(threading.enumerate())
     with world.running():
-        yield world
-
-
-def test_a_mission_lands_and_every_setpoint_is_in_the_log_as_it_went_out(world: World) -> None:
-    flown = world.fly(Listener())
+        flown = world.fly(Listener())
+    assert set(threading.enumerate()) == before
     flight = flown.listener.flight
     assert flown.result.outcome is Outcome.LANDED, flown.result.reason
-    errors = [
-        sum(e * e for e in t.position_error_W) for _, t in flight if t.phase is Phase.TRACK and t.position_error_W
-    ]
-    assert (sum(errors) / len(errors)) ** 0.5 < 0.15
+    tracked = [t.position_error_W for _, t in flight if t.phase is Phase.TRACK and t.position_error_W]
+    assert (sum(e * e for error in tracked for e in error) / len(tracked)) ** 0.5 < 0.15
     chosen = thrust_map("vehicle", vehicle_of(Mission.model_validate(world.keys)))
     logged = [bytes.fromhex(sent.packet) for inputs, _ in flight for sent in inputs.link.transmitted]
-    asked = [chosen.counts(t.setpoint.thrust_N) for _, t in flight if t.phase.airborne and t.setpoint is not None]
-    flown_counts = [struct.unpack("<H", packet[13:])[0] for packet in logged if packet[0] == 0x3C]
-    flown_counts = [counts for counts in flown_counts if counts > 0]
-    assert len(flown_counts) >= 0.98 * len(asked)  # one that another overtook in the thread is not sent
-    assert [counts for counts in flown_counts if counts not in asked] == []
     assert sorted(logged) == sorted(world.path.sent_up(0x3C) + world.path.sent_up(0x7C))
+    asked = [chosen.counts(t.setpoint.thrust_N) for _, t in flight if t.phase.airborne and t.setpoint is not None]
+    went_out = [counts for packet in logged if packet[0] == 0x3C for counts in struct.unpack_from("<H", packet, 13)]
+    went_out = [counts for counts in went_out if counts > 0]
+    assert len(went_out) >= 0.98 * len(asked)  # one that another overtook in the thread is not sent
+    assert set(went_out) <= set(asked)
     assert world.path.sent_up(0x7D) == [crtp_wire.NOTIFY_STOP] * 3
-    assert not flown.threads
 
 
-def test_from_loss_in_flight_it_brakes_and_lands(world: World) -> None:
-    luck = random.Random(4)  # noqa: S311 - nothing is to be kept secret
-    flown = world.fly(in_track(lambda: setattr(world.path, "loses", lambda _data, _up: luck.random() < 0.3)))
+def test_from_heavy_loss_in_flight_it_brakes_and_lands(faulty: dict[str, Flown]) -> None:
+    flown = faulty["lossy"]
     assert flown.result.outcome is Outcome.ABORTED, flown.result.reason
     assert flown.listener.phases[-1] is Phase.LANDED
     assert "link_loss_severe" in codes(flown.listener.flight)
     assert Phase.LAND_NOW in flown.listener.phases
-    assert not flown.threads
 
 
-def test_three_seconds_of_silence_are_seen_in_a_tenth_and_the_vehicle_does_what_it_does_alone(world: World) -> None:
-    def freeze() -> None:
-        world.path.loses = lambda _data, _up: True
-        threading.Timer(3.0, setattr, (world.path, "loses", lambda _data, _up: False)).start()
-
-    flown = world.fly(in_track(freeze))
+def test_three_seconds_of_silence_are_seen_in_a_tenth_and_the_vehicle_does_what_it_does_alone(
+    faulty: dict[str, Flown],
+) -> None:
+    flown = faulty["silent"]
     inputs, tick = flown.first("link_age")
     assert inputs.link.age_ns is not None
-    assert 100e6 < inputs.link.age_ns < 150e6 + inputs.now_ns - inputs.deadline_ns
+    slept_ns = inputs.now_ns - inputs.deadline_ns + 10_000_000 * inputs.missed
+    assert 100e6 < inputs.link.age_ns < 150e6 + slept_ns
     assert tick.phase is Phase.BRAKE_HOLD
     assert Phase.LAND_NOW in flown.listener.phases
-    # 2 s without setpoints: its motors stopped and it is locked, whatever the host would have liked.
-    assert flown.result.outcome is Outcome.CRASHED
-    assert not flown.threads
+    # It keeps its last thrust, and after 2 s it stops its motors and is locked, whatever the host would have liked:
+    # it says so itself once it is heard again, unless it has climbed out of the fence before.
+    assert flown.result.outcome in (Outcome.CRASHED, Outcome.CUT)
+    assert {"vehicle_crashed", "fence_far", "hard_landing"} & codes(flown.listener.flight)
 
 
-def test_a_killed_peer_ends_the_flight_in_seconds(world: World) -> None:
+def test_a_killed_peer_ends_the_flight_in_seconds(faulty: dict[str, Flown]) -> None:
     """Poses end with it, so that nobody sees anything any more: level descent for its time, then the stop."""
-    flown = world.fly(in_track(world.process.kill))
-    phases = flown.listener.phases
-    assert phases[-2:] == [Phase.DESCEND_BLIND, Phase.KILL]
+    flown = faulty["killed"]
+    assert flown.listener.phases[-2:] == [Phase.DESCEND_BLIND, Phase.KILL]
     assert flown.result.outcome is Outcome.CUT
     gone_ns = flown.entered(Phase.BRAKE_HOLD).now_ns
-    assert flown.entered(Phase.DESCEND_BLIND).now_ns - gone_ns < 0.4e9
+    assert flown.entered(Phase.DESCEND_BLIND).now_ns - gone_ns < 0.5e9
     assert flown.entered(Phase.KILL).now_ns - gone_ns < 10e9
-    assert not flown.threads

@@ -244,7 +244,15 @@ def _pair(sequence: int) -> Pair:
     state = State((x, y, 1.0 + 0.1 * x), (-y, x, -0.1 * y), (0.1 * x, 0.1 * y, 0.0, 0.99), (0.01 * x, 0.02 * y, x * y))
     raw = RawPose(sequence, now_ns, now_ns, state.p_WB, state.q_WB, state.v_WB_W, state.w_WB_B)
     shares = (0.5 + 0.01 * x, 0.5 - 0.01 * x, 0.5 + 0.01 * y, 0.5 - 0.01 * y)
-    telemetry = Telemetry(now_ns, 3.9 + 0.01 * x, True, True, False, state.q_WB, shares)
+    telemetry = Telemetry(
+        stamp_ns=now_ns,
+        battery_V=3.9 + 0.01 * x,
+        armed=True,
+        airborne=True,
+        crashed=False,
+        q_WB=state.q_WB,
+        motor_shares=shares,
+    )
     inputs = TickInputs(
         sequence,
         now_ns + 120_000,

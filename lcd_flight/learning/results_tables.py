@@ -125,8 +125,8 @@ def shipped(result: Reproduction) -> str:
 
 
 LESSON_WORDS = {
-    "optima-only": "learned, from minimum-snap optima alone",
-    "convex": "learned, input-convex on 39 knot numbers",
+    "optima-only": "learned, on optima alone",
+    "convex": "learned, input-convex",
 }
 
 

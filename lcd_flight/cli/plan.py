@@ -21,44 +21,31 @@ PlanFile = Annotated[
     Path | None, typer.Option("--plan", help="A plan file (`lcd plan MISSION --out FILE`) in place of planning.")
 ]
 NoCache = Annotated[bool, typer.Option("--no-cache", help="Plan anew, and keep nothing for the next time.")]
-_OF_MISSIONS, _OF_TASKS = "Of a mission", "Of many tasks at once"
 
 
 def plan(
-    mission: Annotated[str | None, typer.Argument(metavar="[MISSION]", help="A mission file, or `demo`.")] = None,
+    mission: Annotated[str | None, typer.Argument(metavar="MISSION", help="A mission file, or `demo`.")] = None,
     out: Annotated[
         Path | None, typer.Option(help="Write the plan: a plan file (JSON); with --tasks the polynomials (.npz).")
     ] = None,
-    html: Annotated[
-        Path | None, typer.Option(help="Write a page: the plan beside minimum snap.", rich_help_panel=_OF_MISSIONS)
-    ] = None,
-    csv: Annotated[
-        Path | None,
-        typer.Option(help="Write the polynomials as CSV of uav_trajectories.", rich_help_panel=_OF_MISSIONS),
-    ] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a page: the plan beside minimum snap.")] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write the polynomials as CSV of uav_trajectories.")] = None,
     from_csv: Annotated[
-        list[Path] | None,
-        typer.Option(
-            help="Take such polynomials as the plan; one file for each trajectory.", rich_help_panel=_OF_MISSIONS
-        ),
+        list[Path] | None, typer.Option(help="Take such polynomials as the plan; once for each trajectory.")
     ] = None,
     plan_file: PlanFile = None,
     no_cache: NoCache = False,
     tasks: Annotated[
-        Path | None, typer.Option(help="Tasks: waypoints (N, K, 3), yaws (N, K) in a .npz.", rich_help_panel=_OF_TASKS)
+        Path | None, typer.Option(help="In place of a MISSION: waypoints (N, K, 3) and yaws (N, K) in a .npz.")
     ] = None,
-    world: Annotated[
-        str | None, typer.Option(help="World that is planned for, e.g. crazyflie-saturated.", rich_help_panel=_OF_TASKS)
-    ] = None,
-    method: Annotated[str, typer.Option(help="Planning method.", rich_help_panel=_OF_TASKS)] = "learned",
-    timing: Annotated[
-        str, typer.Option(help="retimed (at equal total time) or fixed.", rich_help_panel=_OF_TASKS)
-    ] = "retimed",
+    world: Annotated[str | None, typer.Option(help="With --tasks: the world that is planned for.")] = None,
+    method: Annotated[str, typer.Option(help="With --tasks: the planning method.")] = "learned",
+    timing: Annotated[str, typer.Option(help="With --tasks: retimed (at equal total time) or fixed.")] = "retimed",
     model: Annotated[
-        str | None, typer.Option(help="Learned cost by name or file; the world's otherwise.", rich_help_panel=_OF_TASKS)
+        str | None, typer.Option(help="With --tasks: learned cost by name or file; the world's otherwise.")
     ] = None,
-    drag: Annotated[int, typer.Option(help="Drag configuration, 1 to 5.", rich_help_panel=_OF_TASKS)] = 3,
-    seed: Annotated[int, typer.Option(help="Of a method's own random choices.", min=0, rich_help_panel=_OF_TASKS)] = 0,
+    drag: Annotated[int, typer.Option(help="With --tasks: drag configuration, 1 to 5.")] = 3,
+    seed: Annotated[int, typer.Option(help="With --tasks: of a method's own random choices.", min=0)] = 0,
     json: Json = False,
     quiet: Quiet = False,
     no_color: NoColor = False,

@@ -33,7 +33,11 @@ def tell_plan(
     loaded = load_mission(mission) if isinstance(mission, str) else mission
     tell_mission(terminal, loaded)
     began_s = time.perf_counter()
-    flight = api.plan(loaded, plan_file=plan_file, csv_files=csv_files, cache=cache)
+    terminal.status(f"planning by {loaded.planner.type} ...")
+    try:
+        flight = api.plan(loaded, plan_file=plan_file, csv_files=csv_files, cache=cache)
+    finally:
+        terminal.end_status()
     took_ms = (time.perf_counter() - began_s) * 1e3
     for note in flight.planned.notes:
         terminal.warn(note)

@@ -63,6 +63,8 @@ def planned_for(plans: PlannedTasks, name: str | None, drag: int | None) -> tupl
     vehicle = world.vehicle(drag or plans.about.get("drag", 3))
     if plans.about.get("vehicle_fingerprint", fingerprint(vehicle, world.loop)) != fingerprint(vehicle, world.loop):
         raise SystemExit(f"{world.name}: its vehicle is another one now than the plans were made for; plan again")
+    if plans.about.get("controller", "geometric") != "geometric":
+        raise SystemExit(f"planned for the controller {plans.about['controller']}, which RotorPy does not have")
     return world, vehicle
 
 

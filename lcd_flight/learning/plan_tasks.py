@@ -82,8 +82,9 @@ def plan_tasks(
     method, problem = find_method(planning.method), _problem(tasks, planning, simulator)
     about = _about(planning, problem)
     folder = out.with_name(f".{out.name}.blocks") / fingerprint({**about, "tasks": hash_of_tasks(tasks)})
-    method(problem.take(np.arange(1)))  # says what is missing before any work, and loads the kernels once
-    plans = _joined(_planned(method, problem, folder, Meter(progress, len(tasks), "tasks")), about)
+    trial = method(problem.take(np.arange(1)))  # says what is missing before any work, and loads the kernels once
+    parts = _planned(method, problem, folder, Meter(progress, len(tasks), "tasks"))
+    plans = _joined(parts, {**about, "controller": trial.controller})
     save_plans(out, plans)
     shutil.rmtree(folder.parent, ignore_errors=True)
     return plans

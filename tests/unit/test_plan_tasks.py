@@ -71,6 +71,7 @@ def test_what_is_written(tmp_path: Path) -> None:
         assert archive["fell_back"].dtype == bool
         about = json.loads(str(archive["about"]))
     assert (about["world"], about["method"], about["drag"]) == ("crazyflie-saturated v2", "minimum-snap", 3)
+    assert about["controller"] == "geometric"
     expected = minimum_snap_batch(TASKS.poses, TASKS.durations_s(WORLD.speed))
     assert np.array_equal(made.trajectories.coefficients, expected.coefficients)
     assert [path.name for path in tmp_path.iterdir()] == ["plans.npz"]

@@ -110,7 +110,7 @@ class _Lines:
     def __init__(self, terminal: Terminal) -> None:
         self._terminal = terminal
         self._phase: str | None = None
-        self._shown: Any = None
+        self._told = 0
         self._status_s = 0.0
 
     def __call__(self, picture: Picture, now_s: float) -> None:
@@ -119,14 +119,14 @@ class _Lines:
 
         if picture.report is None or picture.received_s != now_s:
             return
-        new = [line for line in picture.lines if self._shown is None or line.time_s > self._shown]
-        for line in new:
+        unseen = min(picture.told - self._told, len(picture.lines))
+        for line in list(picture.lines)[len(picture.lines) - unseen :]:
             self._terminal.detail(f"{line.time_s:.1f} s  {line.text}")
-            self._shown = line.time_s
+        self._told = picture.told
         phase = picture.report.tick.phase.value
         if phase != self._phase or now_s - self._status_s >= LINE_EACH_S:
             self._phase, self._status_s = phase, now_s
-            self._terminal.line("MONITOR", status(picture))
+            self._terminal.line("MONITOR", status(picture, picture.report))
 
 
 def _facts(picture: Picture) -> dict[str, Any]:

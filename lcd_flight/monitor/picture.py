@@ -45,6 +45,8 @@ class Picture:
         self.reports = 0
         self.lines: deque[Line] = deque(maxlen=KEPT_LINES)
         """The last ones."""
+        self.told = 0
+        """How many there were in all."""
         self.received_s = 0.0
         """When the newest report came, on the watcher's clock."""
         self._first_ns = 0
@@ -68,8 +70,10 @@ class Picture:
         self._window.append(frame)
         while frame.tick.now_ns - self._window[0].tick.now_ns > WINDOW_NS:
             self._window.popleft()
-        self.lines += [Line(self.time_s, finding.message, finding) for finding in frame.findings]
-        self.lines += [Line(self.time_s, text, None) for text in frame.messages]
+        new = [Line(self.time_s, finding.message, finding) for finding in frame.findings]
+        new += [Line(self.time_s, text, None) for text in frame.messages]
+        self.lines += new
+        self.told += len(new)
 
     def _begin(self, frame: LiveReport) -> None:
         """The first report, or the first of the next flight."""

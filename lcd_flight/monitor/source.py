@@ -33,7 +33,7 @@ class LiveSource:
             self._socket.connect(self._endpoint)
         except zmq.ZMQError as error:
             self._context.destroy(linger=0)
-            reason = zmq.strerror(error.errno)
+            reason = zmq.strerror(error.errno or 0)
             raise InputError(f"{self._endpoint!r}: {reason}; expected e.g. tcp://127.0.0.1:5565") from error
         return self
 

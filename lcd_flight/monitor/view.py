@@ -11,6 +11,7 @@ from rich.text import Text
 
 from lcd_flight.model import LinkReport, Phase, PoseReport, Severity
 from lcd_flight.monitor.picture import Line, Picture
+from lcd_flight.wire.live_frame import LiveReport
 
 SILENT_S = 1.0
 """After so long without a report the view says so."""
@@ -28,7 +29,7 @@ def render(picture: Picture, now_s: float) -> RenderableType:
     table = Table.grid(padding=(0, 2))
     table.add_column(style="dim", min_width=9)
     table.add_column()
-    for label, text in rows(picture, now_s):
+    for label, text in rows(picture, picture.report, now_s):
         table.add_row(label, text)
     parts: list[RenderableType] = [table]
     if picture.lines:
@@ -36,15 +37,13 @@ def render(picture: Picture, now_s: float) -> RenderableType:
     return Panel(Group(*parts), title=_title(picture), title_align="left")
 
 
-def rows(picture: Picture, now_s: float) -> list[tuple[str, Text]]:
-    """Label and text of each row; the picture holds a report."""
-    report = picture.report
-    assert report is not None  # noqa: S101 - the caller's promise, for the type checker
+def rows(picture: Picture, report: LiveReport, now_s: float) -> list[tuple[str, Text]]:
+    """Label and text of each row. report: the picture's newest."""
     inputs = report.inputs
     found = [
-        ("phase", _phase(picture)),
-        ("position", _position(picture)),
-        ("error", _error(picture)),
+        ("phase", _phase(picture, report)),
+        ("position", _position(inputs.pose)),
+        ("error", _error(picture, report)),
         ("battery", _battery(inputs.link)),
         ("link", _link(inputs.link)),
         ("mocap", _mocap(inputs.pose)),
@@ -56,9 +55,9 @@ def rows(picture: Picture, now_s: float) -> list[tuple[str, Text]]:
     return found
 
 
-def status(picture: Picture) -> str:
-    """The view in one line, for a pipe; the picture holds a report."""
-    return "  ".join(text.plain for _, text in rows(picture, picture.received_s))
+def status(picture: Picture, report: LiveReport) -> str:
+    """The view in one line, for a pipe."""
+    return "  ".join(text.plain for _, text in rows(picture, report, picture.received_s))
 
 
 def _title(picture: Picture) -> str:
@@ -66,9 +65,8 @@ def _title(picture: Picture) -> str:
     return "flight" if header is None else f"{header.name}  {header.vehicle.name}  {header.link}"
 
 
-def _phase(picture: Picture) -> Text:
-    report, leg = picture.report, picture.leg
-    assert report is not None  # noqa: S101
+def _phase(picture: Picture, report: LiveReport) -> Text:
+    leg = picture.leg
     style = "bold red" if report.tick.phase in _ABNORMAL else "bold green"
     text = Text(report.tick.phase.value.upper(), style=style)
     if leg is not None and picture.header is not None:
@@ -78,18 +76,14 @@ def _phase(picture: Picture) -> Text:
     return text.append(f"  t {picture.time_s:.1f} s", style="dim")
 
 
-def _position(picture: Picture) -> Text:
-    assert picture.report is not None  # noqa: S101
-    state = picture.report.inputs.pose.state
-    if state is None:
+def _position(pose: PoseReport) -> Text:
+    if pose.state is None:
         return Text("no valid pose", style="bold red")
-    x, y, z = state.p_WB
-    return Text(f"{x:+.2f} {y:+.2f} {z:+.2f} m  {math.hypot(*state.v_WB_W):.2f} m/s")
+    x, y, z = pose.state.p_WB
+    return Text(f"{x:+.2f} {y:+.2f} {z:+.2f} m  {math.hypot(*pose.state.v_WB_W):.2f} m/s")
 
 
-def _error(picture: Picture) -> Text:
-    report = picture.report
-    assert report is not None  # noqa: S101
+def _error(picture: Picture, report: LiveReport) -> Text:
     if report.tick.position_error_W is None:
         return Text("no reference", style="dim")
     error_m = math.hypot(*report.tick.position_error_W)

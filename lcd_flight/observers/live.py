@@ -116,9 +116,8 @@ class LivePublisher:
             self._socket.bind(endpoint)
         except zmq.ZMQError as error:
             self.close()
-            raise RefusedError(
-                f"no live view at {endpoint}: {zmq.strerror(error.errno)}; --live tcp://HOST:PORT chooses another place"
-            ) from error
+            reason = zmq.strerror(error.errno or 0)
+            raise RefusedError(f"no live view at {endpoint}: {reason}; --live chooses another place") from error
 
     def __call__(self, data: bytes) -> None:
         """Publish one message part."""

@@ -61,7 +61,8 @@ def text_of(picture: Picture, now_s: float) -> str:
 
 
 def row(picture: Picture, label: str, now_s: float | None = None) -> Any:
-    return dict(rows(picture, picture.received_s if now_s is None else now_s))[label]
+    assert picture.report is not None
+    return dict(rows(picture, picture.report, picture.received_s if now_s is None else now_s))[label]
 
 
 def with_newest(**changes: Any) -> Picture:
@@ -151,7 +152,9 @@ def test_the_next_flight_begins_anew() -> None:
 
 
 def test_one_line_for_a_pipe() -> None:
-    text = status(seen(frames(PAIRS[:500])))
+    picture = seen(frames(PAIRS[:500]))
+    assert picture.report is not None
+    text = status(picture, picture.report)
     assert "\n" not in text
     assert "TRACK" in text
     assert "4.05 V" in text
@@ -199,6 +202,14 @@ def test_it_tells_changes_and_ends_with_the_flight(
     assert facts["max_position_error_m"] == pytest.approx(0.1)
     assert [word in told.err for word in ("PREFLIGHT", "TAKEOFF", "LANDED", "pose gap 42 ms", "ready")] == [True] * 5
     assert told.err.count("pose gap 42 ms") == 1
+
+
+def test_the_lines_of_the_next_flight_are_told_too(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert watch(monkeypatch, [*frames(PAIRS), *frames(PAIRS)], interrupt=True) == 0
+    told = capsys.readouterr().out
+    assert (told.count("pose gap 42 ms"), told.count("ready")) == (2, 2)
 
 
 def test_ctrl_c_is_the_way_to_quit(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

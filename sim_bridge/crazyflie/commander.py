@@ -21,6 +21,8 @@ STOP, MANUAL = 0, 11
 _RPYT = struct.Struct("<fffH")
 _MANUAL = struct.Struct("<BfffHB")
 _SETPOINT, _META = 0, 1
+_PID_CONTROLLERS = (0, 1)
+"""Automatic choice, and by name."""
 
 
 class Modes(Protocol):
@@ -74,7 +76,9 @@ class Commander:
 
     def take(self, packet: Packet, parameters: Modes, now_ms: int) -> None:
         """A packet on one of the two commander ports."""
-        if packet.port == Port.COMMANDER:
+        if parameters["stabilizer.controller"] not in _PID_CONTROLLERS:
+            self._complain("setpoints while stabilizer.controller is not the PID")
+        elif packet.port == Port.COMMANDER:
             if packet.channel == _SETPOINT and len(packet.payload) >= _RPYT.size:
                 self._rpyt(packet.payload, parameters, now_ms)
         elif packet.channel == _META:

@@ -114,12 +114,11 @@ class Firmware:
         return self.parameters["stabilizer.estimator"] == KALMAN
 
     def _supervise(self) -> None:
-        x, y, z = self._body.acceleration_g
         around = Surroundings(
             now_ms=self.now_ms,
             setpoint_ms=self.commander.stamp_ms,
             motors_run=self.flies,
-            acceleration_g=(x, y, z),
+            acceleration_g=self._body.acceleration_g,
             stop_parameter=bool(self.parameters["stabilizer.stop"]),
             tumble_check=bool(self.parameters["supervisor.tmblChckEn"]),
             preflight_timeout_ms=self.parameters["supervisor.prefltTimeout"],

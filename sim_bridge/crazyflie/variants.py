@@ -1,7 +1,8 @@
 """Which Crazyflie it is: platform (motors, arming) and firmware (protocol, thrust map), by name.
 
-Sources: crazyflie-firmware, platform_defaults_*.h (arming, device names), src/modules/interface/platformservice.h and
-crtp.h of the releases (protocol version); the older thrust map was identified on a thrust stand (docs).
+Sources: crazyflie-firmware, src/platform (arming, device names); cflib 0.1.34, crazyflie/commander.py and supervisor.py
+(what a client does up to protocol 8 and from protocol 12 on); the older thrust map is one that others have identified
+for a Crazyflie 2.0.
 """
 
 from __future__ import annotations

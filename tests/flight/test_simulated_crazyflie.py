@@ -123,6 +123,12 @@ class TestSigns:
         turned = math.degrees(yaw_of(client.state.q_WB) - before)
         assert turned == pytest.approx(-30.0, abs=5.0)
 
+    def test_a_yaw_rate_without_thrust_is_not_saved_up(self, client: Client) -> None:
+        client.unlock()
+        client.fly(1000.0, 0, yaw=90.0)
+        client.fly(700.0, 45_000)
+        assert abs(math.degrees(yaw_of(client.state.q_WB))) < 3.0
+
     def test_the_yaw_rate_of_a_manual_setpoint_is_counter_clockwise(self, client: Client) -> None:
         client.take_off()
         for _ in range(100):
@@ -447,6 +453,13 @@ class TestWhatIsNotSimulated:
             client.ask(packet)
             client.wait(20.0)
         assert client.text.count("SIM: not simulated, ignored") == 1
+
+    def test_other_controllers_than_the_pid_do_not_fly(self, client: Client) -> None:
+        client.wait(200.0)
+        client.set("stabilizer.controller", 2)
+        client.take_off()
+        assert client.height_m == 0.0
+        assert "not the PID" in client.text
 
     def test_rates_of_roll_and_pitch_are_ignored(self, client: Client) -> None:
         client.wait(200.0)

@@ -1,7 +1,8 @@
 """What a labelled rollout costs from nothing to disk, and where the time goes; RotorPy's way to one beside it.
 
 Processor time counts where one core works, so that a busy machine is nobody's loss; rows of all cores are of the wall
-clock. The peer plans its minimum snap and flies it in closed loop, one after another, and writes nothing.
+clock and of whole processes. The peer plans its minimum snap and flies it in closed loop, one after another; it writes
+nothing.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -26,8 +28,8 @@ from lcd_flight.learning.dataset import Dataset
 from lcd_flight.learning.dataset_card import write_card
 from lcd_flight.learning.manifest import Manifest
 from lcd_flight.learning.sampling import first_tasks, sample_tasks
-from lcd_flight.learning.spread import Spread, cores, in_threads, in_turn
-from lcd_flight.model import Trajectory
+from lcd_flight.learning.spread import cores, in_turn
+from lcd_flight.model import Trajectory, World
 from lcd_flight.model.streams import Stream
 from lcd_flight.planning.knots import Whitening
 from lcd_flight.worlds import load_world
@@ -58,35 +60,29 @@ def rows(report: Report) -> list[Row]:
     with threadpool_limits(1):
         report("ours; a first run compiles")
         for world in (WORLD, FLIGHT):
-            _made(world, 1_000, in_turn)
+            _made(world, 1_000)
         report(f"ours, {COUNT:,} rollouts on one core, then on all")
         profile = cProfile.Profile(time.thread_time)
-        cpu_s = _made(WORLD, COUNT, in_turn, profile)[1]
-        flight_cpu_s = _made(FLIGHT, COUNT // 10, in_turn)[1]
-        wall_s = _made(WORLD, COUNT, in_threads())[0]
+        cpu_s = _made(WORLD, COUNT, profile)
+        flight_cpu_s = _made(FLIGHT, COUNT // 10)
+        commands = {count: _command(count) for count in (COUNT, 5 * COUNT)}
         report(f"RotorPy, {PEER_FLIGHTS} tasks")
         theirs = PEER_FLIGHTS / _rotorpy_cpu_s()
     return [
         _row("labels on disk, paper's loop, 1 core", "1/CPU-s", COUNT / cpu_s, theirs, "RotorPy MinSnap and single"),
         _row("labels on disk, flight loop, 1 core", "1/CPU-s", 0.1 * COUNT / flight_cpu_s),
-        _row(f"labels on disk, paper's loop, {cores()} cores", "1/s", COUNT / wall_s),
-        _row(f"{COUNT:,} rollouts on disk, {cores()} cores", "s", wall_s),
+        *(_row(f"{n:,} rollouts on disk, {cores()} cores", "s", wall_s) for n, (wall_s, _) in commands.items()),
+        *(_row(f"{n:,} rollouts, peak memory", "MB", peak_MB) for n, (_, peak_MB) in commands.items()),
         *(_row(f"share of {step}", "%", share) for step, share in shares(profile).items()),
-        _row(f"peak memory, {COUNT:,} rollouts, {cores()} cores", "MB", _peak_MB(COUNT)),
-        _row(f"peak memory, {5 * COUNT:,} rollouts, {cores()} cores", "MB", _peak_MB(5 * COUNT)),
     ]
 
 
-def _made(world: Any, count: int, spread: Spread, profile: cProfile.Profile | None = None) -> tuple[float, float]:
-    """Make a data set in a folder that is thrown away; wall clock and processor time in s."""
-    with tempfile.TemporaryDirectory() as folder:
-        begun_s, begun_cpu_s = time.perf_counter(), time.process_time()
-        if profile is not None:
-            profile.enable()
-        collect(CollectConfig(world, seed=0), count, Path(folder), MultirotorSimulator(), spread=spread)
-        if profile is not None:
-            profile.disable()
-        return time.perf_counter() - begun_s, time.process_time() - begun_cpu_s
+def _made(world: World, count: int, profile: cProfile.Profile | None = None) -> float:
+    """Make a data set on one core, in a folder that is thrown away; processor time in s."""
+    with tempfile.TemporaryDirectory() as folder, profile or nullcontext():
+        begun = time.process_time()
+        collect(CollectConfig(world, seed=0), count, Path(folder), MultirotorSimulator(), spread=in_turn)
+        return time.process_time() - begun
 
 
 def shares(profile: cProfile.Profile) -> dict[str, float]:
@@ -114,9 +110,18 @@ def _rotorpy_cpu_s() -> float:
     return time.process_time() - begun
 
 
-def _peak_MB(count: int) -> float:
-    """The most memory that `lcd collect` ever held, in a process of its own."""
-    script = """
+def _command(count: int) -> tuple[float, float]:
+    """Wall clock in s and most memory in MB of `lcd collect` on all cores, a process of its own."""
+    with tempfile.TemporaryDirectory() as folder:
+        options = ["--world", WORLD.name, "--count", str(count), "--out", folder, "--quiet"]
+        begun = time.perf_counter()
+        done = subprocess.run(
+            [sys.executable, "-c", _COMMAND, "collect", *options], check=True, stdout=subprocess.PIPE, text=True
+        )
+        return time.perf_counter() - begun, int(done.stdout.split()[-1]) / 1024.0
+
+
+_COMMAND = """
 import sys
 from pathlib import Path
 from lcd_flight.cli.main import app, run
@@ -125,11 +130,7 @@ status = dict(line.split(":") for line in Path("/proc/self/status").read_text().
 print(status["VmHWM"].split()[0])
 sys.exit(code)
 """
-    with tempfile.TemporaryDirectory() as folder:
-        options = ["--world", WORLD.name, "--count", str(count), "--out", folder, "--quiet"]
-        command = [sys.executable, "-c", script, "collect", *options]
-        done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
-    return int(done.stdout.split()[-1]) / 1024.0
+"""The command, and what Linux says of its memory: a parent would see its own where it was larger."""
 
 
 def _row(what: str, unit: str, ours: float, peer: float | None = None, peer_name: str | None = None) -> Row:

@@ -110,8 +110,9 @@ def _mix(sources: str | None, given: GivenPlans | None, shard_rows: int) -> Mix:
     """As asked for; else the given plans alone, or the usual mix."""
     from lcd_flight.learning.mix import Mix, parse_mix
 
-    usual = Mix(shard_rows=shard_rows) if given is None else parse_mix("plans=1", shard_rows)
-    return usual if sources is None else parse_mix(sources, shard_rows)
+    if sources is not None:
+        return parse_mix(sources, shard_rows)
+    return Mix(shard_rows=shard_rows) if given is None else parse_mix("plans=1", shard_rows)
 
 
 def _spread(threads: int, ray: str | None) -> Spread:

@@ -48,15 +48,16 @@ class Mix:
         """Check that it can be dealt out.
 
         Raises:
-            InputError: negative shares, a sum that is not 1, or a share that is less than one task in a shard.
+            InputError: negative shares, a sum that is not 1, or a share that is less than a task in a shard.
         """
         shares = {source: getattr(self, name) for name, source in SOURCES.items()}
         if not all(0.0 <= share <= 1.0 for share in shares.values()) or abs(sum(shares.values()) - 1.0) > _EXACT:
             raise InputError(f"sources: shares from 0 to 1 that add up to 1 are wanted, not {_told(self)}")
         for name, source in SOURCES.items():
             if shares[source] > 0.0 and self.tasks_in_a_shard(source) < 1:
-                least = self.rows_of_a_task(source) / self.shard_rows
-                raise InputError(f"sources: {name}={shares[source]:g} is too little; give 0 or at least {least:.3g}")
+                lump, most = self.rows_of_a_task(source), self.shard_rows
+                remedy = f"{lump / most:.3g} or more" if lump <= most else f"shards of at least {lump} rows"
+                raise InputError(f"sources: {name}={shares[source]:g} is less than a task in a shard; give {remedy}")
 
     def rows_of_a_task(self, source: Source) -> int:
         """How many rows one task of a source gives."""

@@ -6,8 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from lcd_flight.learning.spread import in_turn
-
 BENCH = Path(__file__).parents[2] / "benchmarks" / "bench_collect.py"
 
 
@@ -24,7 +22,7 @@ def bench():
 
 def test_rows(bench, monkeypatch):
     asked = []
-    monkeypatch.setattr(bench, "_peak_MB", lambda count: asked.append(count) or 1.0)
+    monkeypatch.setattr(bench, "_command", lambda count: asked.append(count) or (2.0, 1.0))
     said = []
     rows = bench.rows(said.append)
     assert all(set(row) == {"what", "unit", "ours", "peer", "peer_name", "ratio"} for row in rows)
@@ -37,11 +35,13 @@ def test_rows(bench, monkeypatch):
 
 def test_every_step_is_seen_and_the_rollouts_are_most_of_it(bench):
     profile = cProfile.Profile()
-    bench._made(bench.WORLD, 900, in_turn, profile)
+    bench._made(bench.WORLD, 900, profile)
     shares = bench.shares(profile)
     assert all(share > 0.0 for share in shares.values())
     assert sum(shares.values()) == pytest.approx(100.0)
 
 
-def test_memory_is_that_of_a_process_of_its_own(bench):
-    assert 50.0 < bench._peak_MB(100) < 2000.0
+def test_the_command_is_a_process_of_its_own(bench):
+    wall_s, peak_MB = bench._command(100)
+    assert wall_s > 0.0
+    assert 50.0 < peak_MB < 2000.0

@@ -15,7 +15,7 @@ from lcd_flight.worlds import load_world
 CTRL_C = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
 LCD = [sys.executable, "-c", f"{CTRL_C}; from lcd_flight.cli.main import lcd; lcd()"]
 """Takes SIGINT as from a terminal, also where the tests run in the background, which ignores it."""
-SHARDS, ROWS = 40, 1_500
+SHARDS, ROWS = 30, 1_000
 COUNT = ["--count", str(SHARDS * ROWS), "--shard-rows", str(ROWS)]
 COLLECT = [*LCD, "collect", "--world", "crazyflie-saturated", "--sources", "optimum=1", *COUNT]
 

@@ -118,6 +118,23 @@ def test_a_negative_mass_is_told_with_its_line(collect):
     assert "-0.03" in result["error"]
 
 
+def test_a_shard_cut_in_half_is_named_and_made_again_once_deleted(collect):
+    options = ("--sources", "optimum=1", "--shard-rows", "20")
+    collect(*options, count=50)
+    whole = {path.name: path.read_bytes() for path in Path("data").iterdir()}
+    half = Path("data/shard-00001.parquet")
+    half.write_bytes(half.read_bytes()[: half.stat().st_size // 2])
+    code, result, told = collect(*options, count=50)
+    assert code == 2
+    assert result["error"].startswith("data/shard-00001.parquet: damaged (")
+    assert "delete it and run the same `lcd collect` again" in result["error"]
+    assert len(told.strip().splitlines()) == 1
+    assert Path("data/shard-00000.parquet").read_bytes() == whole["shard-00000.parquet"]
+    half.unlink()
+    assert collect(*options, count=50)[0] == 0
+    assert {path.name: path.read_bytes() for path in Path("data").iterdir()} == whole
+
+
 def test_without_ray_its_extra_is_named(collect, monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     code, result, _ = collect("--ray", "auto")

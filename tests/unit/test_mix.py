@@ -75,9 +75,16 @@ def test_a_mix_from_text():
         ("search=0.9", r"add up to 1 are wanted, not search=0.9, random=0"),
         ("search=1.5,random=-0.5", r"shares from 0 to 1"),
         ("search=nan,random=1", r"shares from 0 to 1"),
-        ("search=0.001,random=0.999", r"search=0.001 is too little; give 0 or at least 0.00977"),
+        ("search=0.001,random=0.999", r"search=0.001 is less than a task in a shard; give 0.00977 or more"),
     ],
 )
 def test_what_is_no_mix_is_one_clear_line(text, message):
     with pytest.raises(InputError, match=message):
         parse_mix(text)
+
+
+def test_shards_that_are_too_small_for_a_search():
+    with pytest.raises(
+        InputError, match="search=0.88 is less than a task in a shard; give shards of at least 320 rows"
+    ):
+        Mix(shard_rows=20)

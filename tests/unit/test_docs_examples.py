@@ -39,7 +39,7 @@ def run(block: Block) -> dict[str, Any]:
     return namespace
 
 
-@pytest.mark.parametrize("name", ["method.md", "api.md"])
+@pytest.mark.parametrize("name", ["api.md"])
 def test_python_blocks_are_python(name: str) -> None:
     assert blocks(name, "python")
     for block in blocks(name, "python"):

@@ -79,7 +79,8 @@ def _view(shown: PlanShown, waypoints: FloatArray, title: str, across: int, up: 
     count = max(3, round(spans[0] * scale / 60.0)), max(3, round(spans[1] * scale / 50.0))
     parts = panel.frame(f"{title}: {names[up]}, m", f"{names[across]}, m", ticks=count)
     parts += [panel.line(path[:, across], path[:, up], stroke) for path, stroke in paths]
-    parts += panel.dots(waypoints[:, across], waypoints[:, up], _WAYPOINT, 4.0)
+    radius = 4.0 if len(waypoints) <= _MOST_DOTS else 2.0
+    parts += panel.dots(waypoints[:, across], waypoints[:, up], _WAYPOINT, radius)
     parts += _numbers(panel.at(waypoints[:, across], waypoints[:, up]))
     return _picture(shown, parts, panel, f"{title}: the path through {len(waypoints)} waypoints")
 

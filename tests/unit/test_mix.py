@@ -85,6 +85,6 @@ def test_what_is_no_mix_is_one_clear_line(text, message):
 
 def test_shards_that_are_too_small_for_a_search():
     with pytest.raises(
-        InputError, match="search=0.88 is less than a task in a shard; give shards of at least 320 rows"
+        InputError, match=r"search=0\.88 is less than a task in a shard; give shards of at least 320 rows"
     ):
         Mix(shard_rows=20)

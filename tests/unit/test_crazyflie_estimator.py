@@ -83,6 +83,16 @@ def test_a_reset_begins_where_the_parameters_say(client: Client) -> None:
     assert all(map(math.isfinite, state.p_WB))
 
 
+def test_choosing_the_filter_begins_it_anew() -> None:
+    client = Client()
+    client.set("kalman.initialX", 3.0)
+    client.wait(10.0)
+    assert estimator(client).state.p_WB[0] == 0.0
+    client.set("stabilizer.estimator", KALMAN)
+    client.wait(10.0)
+    assert estimator(client).state.p_WB[0] == pytest.approx(3.0, abs=1e-3)
+
+
 def test_a_position_alone_says_nothing_of_the_attitude(client: Client) -> None:
     for _ in range(50):
         client.ask(b"\x6c" + struct.pack("<fff", 1.0, -2.0, 0.0))

@@ -99,7 +99,7 @@ class Connection:
             return await asyncio.shield(running)
         except asyncio.CancelledError:
             self._cancelled.set()
-            await asyncio.wait({running})
+            await asyncio.gather(running, return_exceptions=True)
             raise
 
     async def _listen(self, session: Session) -> None:

@@ -77,7 +77,7 @@ async def _inspect(scheme: str, address: str, given: Mapping[str, str], clock: C
         return _told(await asyncio.shield(looking))
     finally:
         cancelled.set()
-        await asyncio.wait({looking})
+        await asyncio.gather(looking, return_exceptions=True)
 
 
 def _look(uri: str, limit_s: float, clock: Clock, cancelled: threading.Event) -> _Seen:

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from lcd_flight.cli.options import Json, NoColor, Quiet
-from lcd_flight.cli.terminal import Terminal, following
+from lcd_flight.cli.terminal import Terminal
+from lcd_flight.cli.watched import watched
 from lcd_flight.errors import Outcome
 
 
@@ -23,7 +24,6 @@ def recover(
 
     Replay and review read a cut file as it is; other programs want the index.
     """
-    from lcd_flight.learning.progress import Meter
     from lcd_flight.record import recover as recovering
 
     terminal = Terminal(json_line=json, quiet=quiet, color=not no_color)
@@ -41,8 +41,8 @@ def recover(
         terminal.line("RECOVER", f"{log} is whole: nothing to be done")
         return terminal.finish(Outcome.OK, facts)
     target = out or log.with_suffix(".recovered.mcap")
-    with following(terminal, "RECOVER") as show:
-        recovering.recover(log, target, found.lost, Meter(show, log.stat().st_size, "bytes").advance)
+    with watched(terminal, "RECOVER", log, "bytes") as advance:
+        recovering.recover(log, target, found.lost, advance)
     terminal.line("RECOVER", f"{target}: {found.ticks} ticks, {found.duration_s:.2f} s")
     terminal.detail(f"lost: {found.lost}")
     return terminal.finish(Outcome.OK, {**facts, "recovered": str(target)})

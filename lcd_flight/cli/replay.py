@@ -11,6 +11,7 @@ import typer
 
 from lcd_flight.cli.options import Json, NoColor, Quiet
 from lcd_flight.cli.terminal import Terminal
+from lcd_flight.cli.watched import watched
 from lcd_flight.errors import InputError, Outcome
 
 if TYPE_CHECKING:
@@ -40,10 +41,12 @@ def replay(
     from lcd_flight.record.reader import read_flight
 
     terminal = Terminal(json_line=json, quiet=quiet, color=not no_color)
-    header, flight = read_flight(log)
+    with watched(terminal, "READ", log, "bytes") as advance:
+        header, flight = read_flight(log, advance)
     if not flight or flight[0][0].sequence != 0:
         raise InputError(f"{log}: its first tick is missing: a replay begins with it")
-    found = compare(flight, _setup(header, controller, gains))
+    with watched(terminal, "REPLAY", flight, "ticks") as advance:
+        found = compare(flight, _setup(header, controller, gains), advance)
     if found.missing_after is not None:
         terminal.warn(f"ticks are missing after tick {found.missing_after}: the comparison ends there")
     if csv is not None:

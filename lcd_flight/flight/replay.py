@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from lcd_flight.flight.memory import Memory
@@ -85,16 +85,22 @@ def replayed(inputs: Iterable[TickInputs], setup: FlightSetup) -> Iterator[Tick]
         yield decided
 
 
-def compare(flight: Sequence[Pair], setup: FlightSetup) -> Comparison:
+def compare(
+    flight: Sequence[Pair], setup: FlightSetup, advance: Callable[[int], object] = lambda _: None
+) -> Comparison:
     """The flight beside its replay, from its first tick to the first that the log misses.
+
+    advance: told with every tick.
 
     What a tick remembers comes from all ticks before it: after a gap there is nothing to compare with.
     """
     unbroken = _unbroken(flight)
-    again = replayed((inputs for inputs, _ in unbroken), setup)
-    pairs = tuple(Difference(logged, now) for (_, logged), now in zip(unbroken, again, strict=True))
+    pairs = []
+    for (_, logged), now in zip(unbroken, replayed((inputs for inputs, _ in unbroken), setup), strict=True):
+        pairs.append(Difference(logged, now))
+        advance(1)
     different = tuple(pair for pair in pairs if pair.logged != pair.replayed)
-    return Comparison(pairs, different, None if len(unbroken) == len(flight) else len(unbroken) - 1)
+    return Comparison(tuple(pairs), different, None if len(unbroken) == len(flight) else len(unbroken) - 1)
 
 
 def _unbroken(flight: Sequence[Pair]) -> Sequence[Pair]:

@@ -7,7 +7,7 @@ chunk: chunks are taken apart here (https://mcap.dev/spec).
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from typing import IO, TypeAlias
@@ -46,14 +46,27 @@ class Cut:
 
 Record: TypeAlias = McapRecord | LostChunk | Cut
 
+Advance: TypeAlias = Callable[[int], object]
+"""Told how much more of long work is done: bytes, or ticks."""
 
-def records(stream: IO[bytes]) -> Iterator[Record]:
-    """Every record, those of chunks in the place of the chunk. The last is a `Footer`, or `Cut`."""
+
+def unwatched(_: int) -> None:
+    """For callers whom nobody watches."""
+
+
+def records(stream: IO[bytes], advance: Advance = unwatched) -> Iterator[Record]:
+    """Every record, those of chunks in the place of the chunk. The last is a `Footer`, or `Cut`.
+
+    advance: told with each chunk.
+    """
     reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=_LARGEST_RECORD_BYTES)
+    told = 0
     try:
         for record in reader.records:
             if isinstance(record, Chunk):
                 yield from _of_chunk(record)
+                advance(stream.tell() - told)
+                told = stream.tell()
             else:
                 yield record
     except DAMAGE:

@@ -14,7 +14,7 @@ from mcap.records import Attachment, Channel, Footer, Header, Message, Metadata
 from mcap.writer import MCAP0_MAGIC
 
 from lcd_flight.model import InputError, Tick, TickInputs
-from lcd_flight.record.container import LostChunk, Record, records
+from lcd_flight.record.container import Advance, LostChunk, Record, records, unwatched
 from lcd_flight.record.flight_log import FlightLog, findings_of, missing_ticks, series_of
 from lcd_flight.record.header import FLIGHT, LOG_SCHEMA, PROFILE, RECOVERED, FlightHeader, header_from
 from lcd_flight.record.topics import TICK, TICK_INPUTS
@@ -40,13 +40,15 @@ class _Content:
     """Whether a chunk was lost."""
 
 
-def read_log(path: Path) -> FlightLog:
+def read_log(path: Path, advance: Advance = unwatched) -> FlightLog:
     """The flight as arrays; of a cut file, what was flushed before the cut.
+
+    advance: told the bytes that were read.
 
     Raises:
         InputError: it is no flight log, or not one that this version can read, or it holds no tick.
     """
-    content = _content_of(path)
+    content = _content_of(path, advance)
     header, pairs = _header(path, content), _pairs(path, content)
     if not pairs:
         raise InputError(f"{path}: describes a flight but holds no tick: it ended before the first was written")
@@ -72,13 +74,15 @@ def read_ticks(path: Path) -> list[Pair]:
     return read_flight(path)[1]
 
 
-def read_flight(path: Path) -> tuple[FlightHeader, list[Pair]]:
+def read_flight(path: Path, advance: Advance = unwatched) -> tuple[FlightHeader, list[Pair]]:
     """The flight's description and its ticks.
+
+    advance: told the bytes that were read.
 
     Raises:
         InputError: it is no flight log, or not one that this version can read.
     """
-    content = _content_of(path)
+    content = _content_of(path, advance)
     return _header(path, content), _pairs(path, content)
 
 
@@ -117,10 +121,10 @@ def opened(path: Path) -> Iterator[IO[bytes]]:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
 
 
-def _content_of(path: Path) -> _Content:
+def _content_of(path: Path, advance: Advance) -> _Content:
     with opened(path) as stream:
         content = _Content()
-        for record in records(stream):
+        for record in records(stream, advance):
             _take(content, record)
     return content
 

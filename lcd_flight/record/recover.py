@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,17 +13,11 @@ from mcap.records import Attachment, Channel, Header, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
 from lcd_flight.model import InputError, RefusedError
-from lcd_flight.record.container import Cut, LostChunk, Record, records
+from lcd_flight.record.container import Advance, Cut, LostChunk, Record, records, unwatched
 from lcd_flight.record.header import RECOVERED
 from lcd_flight.record.reader import opened, read_header
 from lcd_flight.record.topics import TICK, TICK_INPUTS
 from lcd_flight.record.writer import CHUNK_BYTES
-
-Advance = Callable[[int], object]
-"""Told how many bytes more were read."""
-
-_REPORT_EACH = 5000
-"""Records between two words of progress."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,9 +79,10 @@ def condition(path: Path) -> Condition:
     return Condition(len(ticks), (last_ns - first_ns) * 1e-9, last - first + 1 - len(ticks), lost_chunks, cut)
 
 
-def recover(path: Path, target: Path, lost: str, advance: Advance = lambda _: None) -> None:
+def recover(path: Path, target: Path, lost: str, advance: Advance = unwatched) -> None:
     """Write all that can be read of a log into a new file, indexed; `target` appears once it is whole.
 
+    advance: told the bytes that were read.
     lost: goes into the new file's metadata, by which readers know that the flight's end may be missing.
 
     Raises:
@@ -97,15 +92,11 @@ def recover(path: Path, target: Path, lost: str, advance: Advance = lambda _: No
     read_header(path)
     if target.exists():
         raise InputError(f"{target}: exists already; remove it or choose another name with --out")
-    told = 0
     try:
         with _appearing_whole(target) as stream, opened(path) as source:
             copy = _Copy(stream)
-            for number, record in enumerate(records(source)):
+            for record in records(source, advance):
                 copy.take(record)
-                if number % _REPORT_EACH == 0:
-                    advance(source.tell() - told)
-                    told = source.tell()
             copy.finish({"from": path.name, "lost": lost})
     except OSError as error:
         raise RefusedError(f"{target}: cannot be written: {error.strerror}; choose another place with --out") from error

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from lcd_flight.model import FlightPlan, InputError, RefusedError, Severity, Tick, TickInputs
 from lcd_flight.model.frames import from_yaw
+from lcd_flight.record.container import Advance, unwatched
 from lcd_flight.record.header import FlightHeader, metadata
 from lcd_flight.record.ros_messages import RosMessages
 
@@ -49,7 +50,7 @@ def write_bag(
     folder: Path,
     header: FlightHeader,
     flight: Sequence[tuple[TickInputs, Tick]],
-    advance: Callable[[int], object] = lambda _: None,
+    advance: Advance = unwatched,
 ) -> None:
     """Write a bag (`folder` with an MCAP file and metadata.yaml); after an error or Ctrl-C there is none.
 
@@ -87,7 +88,7 @@ def _messages(
     ros: RosMessages,
     header: FlightHeader,
     flight: Sequence[tuple[TickInputs, Tick]],
-    advance: Callable[[int], object],
+    advance: Advance,
 ) -> Iterator[Stamped]:
     """The flight in order. Time of day is that of the log's beginning plus the host's monotonic time since."""
     offset_ns = round(header.started.timestamp() * 1e9) - flight[0][1].now_ns

@@ -6,11 +6,13 @@ import math
 
 import numpy as np
 
+from lcd_flight.control.adaptive import adaptation
+from lcd_flight.control.drag_compensation import DragModel
 from lcd_flight.control.flight_law import thrust_limit_N
 from lcd_flight.control.geometric import Allocation
 from lcd_flight.model import GeometricGains, InputError, Loop, Vehicle
 from sim_bridge.kernels.block import Craft
-from sim_bridge.kernels.guidance import Law
+from sim_bridge.kernels.guidance import ADAPTIVE, AGAINST_DRAG, FEED_FORWARD, GEOMETRIC, Law
 from sim_bridge.kernels.lane import TICK_S
 from sim_bridge.kernels.multirotor import airframe
 from sim_bridge.kernels.onboard import NO_ONBOARD, onboard
@@ -19,8 +21,13 @@ SUBSTEPS = 2
 """Runge-Kutta steps of a tick in the paper's loop: 0.05 mm from the converged solution over 4.5 s."""
 
 
-_FEED_FORWARD = {"geometric": False, "geometric-feed-forward": True}
-"""The controllers there are, and whether they add the paper's last term (decision 0011: they fly worse with it)."""
+CONTROLLERS = {
+    "geometric": GEOMETRIC,
+    "geometric-feed-forward": FEED_FORWARD,
+    "geometric-drag": AGAINST_DRAG,
+    "geometric-l1": ADAPTIVE,
+}
+"""What `RolloutOptions.controller` may be, and the form of the law that it names (decisions 0011 and 0084)."""
 
 
 def craft_of(vehicle: Vehicle, nominal: Vehicle, loop: Loop, controller: str = "geometric") -> Craft:
@@ -29,13 +36,8 @@ def craft_of(vehicle: Vehicle, nominal: Vehicle, loop: Loop, controller: str = "
     Raises:
         InputError: a loop, a controller or a vehicle that the simulator cannot fly.
     """
-    if controller not in _FEED_FORWARD:
-        raise InputError(f"controller {controller!r} is not known to the simulator; it has: {', '.join(_FEED_FORWARD)}")
-    if loop not in ("paper", "flight"):
-        raise InputError(f"loop {loop!r} is not known to the simulator; it has: paper, flight")
+    _check(loop, controller)
     flight_loop = loop == "flight"
-    if flight_loop and _FEED_FORWARD[controller]:
-        raise InputError(f"controller {controller!r} acts on moments, which the flight loop leaves to the vehicle")
     try:
         air, below = airframe(vehicle), onboard(vehicle, nominal) if flight_loop else NO_ONBOARD
     except ValueError as error:
@@ -43,7 +45,7 @@ def craft_of(vehicle: Vehicle, nominal: Vehicle, loop: Loop, controller: str = "
     steps = round(TICK_S / below.period_s) if flight_loop else SUBSTEPS
     return Craft(
         air=air,
-        law=_law_of(nominal, nominal.flight_gains if flight_loop else nominal.gains, _FEED_FORWARD[controller]),
+        law=_law_of(nominal, nominal.flight_gains if flight_loop else nominal.gains, CONTROLLERS[controller]),
         onboard=below,
         flight_loop=flight_loop,
         steps=steps,
@@ -54,8 +56,21 @@ def craft_of(vehicle: Vehicle, nominal: Vehicle, loop: Loop, controller: str = "
     )
 
 
-def _law_of(vehicle: Vehicle, gains: GeometricGains, feed_forward: bool) -> Law:
-    """The geometric law as a vehicle's controller has it."""
+def _check(loop: Loop, controller: str) -> None:
+    """Refuse what the simulator does not know."""
+    if controller not in CONTROLLERS:
+        raise InputError(f"controller {controller!r} is not known to the simulator; it has: {', '.join(CONTROLLERS)}")
+    if loop not in ("paper", "flight"):
+        raise InputError(f"loop {loop!r} is not known to the simulator; it has: paper, flight")
+    if loop == "flight" and controller != "geometric":
+        raise InputError(
+            f"controller {controller!r} flies in the paper's loop only, down to the motors, which the flight loop "
+            "leaves to the vehicle; take 'geometric'"
+        )
+
+
+def _law_of(vehicle: Vehicle, gains: GeometricGains, form: int) -> Law:
+    """The law as a vehicle's controller has it."""
     return Law(
         mass_kg=vehicle.mass_kg,
         inertia_kg_m2=vehicle.inertia_kg_m2,
@@ -64,7 +79,9 @@ def _law_of(vehicle: Vehicle, gains: GeometricGains, feed_forward: bool) -> Law:
         attitude_gain=gains.attitude,
         rate_gain=gains.body_rates,
         allocation=_allocation(vehicle),
-        feed_forward=feed_forward,
+        form=form,
+        drag=DragModel(vehicle.k_eta, vehicle.k_d, vehicle.k_z, vehicle.k_h, vehicle.parasitic_drag),
+        adaptation=adaptation(vehicle.mass_kg, TICK_S, TICK_S),
         integral_gain=gains.integral,
         integral_limit=gains.integral_limit,
         thrust_limit_N=thrust_limit_N(vehicle),

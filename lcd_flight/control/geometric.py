@@ -179,9 +179,14 @@ def rotor_speeds(thrust_N: float, moment_N_m: Vector3, allocation: Allocation) -
     )
 
 
+def rotor_force(row: Row4, thrust_N: float, moment_N_m: Vector3) -> float:
+    """One rotor's share in N; row: its row of `Allocation.inverse`."""
+    return row[0] * thrust_N + row[1] * moment_N_m[0] + row[2] * moment_N_m[1] + row[3] * moment_N_m[2]
+
+
 def _rotor_speed(row: Row4, thrust_N: float, moment_N_m: Vector3, k_eta: float) -> float:
     """sign(f) sqrt(|f| / k_eta) of one rotor's force f."""
-    force = row[0] * thrust_N + row[1] * moment_N_m[0] + row[2] * moment_N_m[1] + row[3] * moment_N_m[2]
+    force = rotor_force(row, thrust_N, moment_N_m)
     speed = math.sqrt(abs(force) / k_eta)
     return speed if force >= 0.0 else -speed
 

@@ -9,11 +9,17 @@ import numpy as np
 from lcd_flight.model import FloatArray, SeedArray
 from sim_bridge.kernels import rows
 from sim_bridge.kernels.guidance import (
+    ADAPTIVE,
+    AGAINST_DRAG,
+    FEED_FORWARD,
     Law,
     ask_force,
+    ask_force_adaptively,
+    ask_force_against_drag,
     ask_wrench,
     command_attitude,
     command_rotors,
+    command_rotors_in_airflow,
     refer,
     stabilise,
 )
@@ -110,13 +116,29 @@ def command(memory: FloatArray, craft: Craft, seen: int) -> None:
         for lane in range(LANES):
             command_attitude(memory, lane, seen, craft.law, craft.onboard)
         return
-    for lane in range(LANES):
-        ask_force(memory, lane, seen, craft.law)
-    if craft.law.feed_forward:
+    ask(memory, craft.law, seen)
+    if craft.law.form == AGAINST_DRAG:
         for lane in range(LANES):
-            ask_wrench(memory, lane, seen, craft.law, True)
+            command_rotors_in_airflow(memory, lane, seen, craft.law, craft.air)
     else:
         for lane in range(LANES):
-            ask_wrench(memory, lane, seen, craft.law, False)
-    for lane in range(LANES):
-        command_rotors(memory, lane, craft.law, craft.air)
+            command_rotors(memory, lane, craft.law, craft.air)
+
+
+def ask(memory: FloatArray, law: Law, seen: int) -> None:
+    """The paper's loop down to thrust and moment, in the law's form."""
+    if law.form == AGAINST_DRAG:
+        for lane in range(LANES):
+            ask_force_against_drag(memory, lane, seen, law)
+    elif law.form == ADAPTIVE:
+        for lane in range(LANES):
+            ask_force_adaptively(memory, lane, seen, law)
+    else:
+        for lane in range(LANES):
+            ask_force(memory, lane, seen, law)
+    if law.form == FEED_FORWARD:
+        for lane in range(LANES):
+            ask_wrench(memory, lane, seen, law, True)
+    else:
+        for lane in range(LANES):
+            ask_wrench(memory, lane, seen, law, False)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from lcd_flight.control.adaptive import Adaptation, Estimate, found_force, predicted_velocity
+from lcd_flight.control.drag_compensation import DragModel, force_against_drag, rotor_speeds_in_airflow
 from lcd_flight.control.flight_law import integrated, thrust_and_attitude
 from lcd_flight.control.geometric import (
     Allocation,
@@ -12,6 +14,7 @@ from lcd_flight.control.geometric import (
     attitude_setpoint,
     clipped,
     dot,
+    into_body,
     moment,
     moment_feed_forward,
     rotation_of,
@@ -36,6 +39,9 @@ from sim_bridge.kernels.onboard import (
 )
 from sim_bridge.kernels.rows import LANES, load3, load4, load_motion, store3, store4
 
+GEOMETRIC, FEED_FORWARD, AGAINST_DRAG, ADAPTIVE = range(4)
+"""Forms of the law: RotorPy's, with the paper's last term, with its drag model, with the L1 estimate."""
+
 
 class Law(NamedTuple):
     """What the controller believes of the vehicle and how it is tuned (`model.GeometricGains`)."""
@@ -47,8 +53,10 @@ class Law(NamedTuple):
     attitude_gain: float
     rate_gain: float
     allocation: Allocation
-    feed_forward: bool
-    """Whether the paper's last term, which RotorPy drops, is added to the moment."""
+    form: int
+    """GEOMETRIC, FEED_FORWARD, AGAINST_DRAG or ADAPTIVE; in the flight loop, GEOMETRIC."""
+    drag: DragModel
+    adaptation: Adaptation
     integral_gain: Vector3
     integral_limit: float
     thrust_limit_N: float
@@ -109,12 +117,37 @@ def reference(memory: FloatArray, lane: int) -> Sample:
     )
 
 
-def ask_force(memory: FloatArray, lane: int, seen: int, law: Law) -> None:
-    """The paper's loop: the force that the law wants."""
+def geometric_force(memory: FloatArray, lane: int, seen: int, law: Law) -> Vector3:
+    """The force that the geometric law wants, in N, world."""
     p, v, _, _ = load_motion(memory, seen, lane)
     ref = reference(memory, lane)
-    acceleration = acceleration_setpoint(p, v, ref.p_W, ref.v_W, ref.a_W, law.position_gain, law.velocity_gain)
-    store3(memory, rows.FORCE, lane, scaled(acceleration, law.mass_kg))
+    return scaled(
+        acceleration_setpoint(p, v, ref.p_W, ref.v_W, ref.a_W, law.position_gain, law.velocity_gain), law.mass_kg
+    )
+
+
+def ask_force(memory: FloatArray, lane: int, seen: int, law: Law) -> None:
+    """The paper's loop: the force that the law wants."""
+    store3(memory, rows.FORCE, lane, geometric_force(memory, lane, seen, law))
+
+
+def ask_force_against_drag(memory: FloatArray, lane: int, seen: int, law: Law) -> None:
+    """The same, and what the model of drag adds."""
+    v, heading = load3(memory, seen + 3, lane), reference(memory, lane).heading
+    force = force_against_drag(geometric_force(memory, lane, seen, law), v, heading, law.drag)
+    store3(memory, rows.FORCE, lane, force)
+
+
+def ask_force_adaptively(memory: FloatArray, lane: int, seen: int, law: Law) -> None:
+    """The same without the force that has been found; nothing is learned from a tick with a motor clipped."""
+    v, b3 = load3(memory, seen + 3, lane), rotation_of(load4(memory, seen + 6, lane))[2]
+    estimate = Estimate(load3(memory, rows.ESTIMATE, lane), load3(memory, rows.ESTIMATE + 3, lane))
+    found = found_force(estimate, v, memory[rows.CLIPS * LANES + lane] > 0.0, law.adaptation)
+    wanted = geometric_force(memory, lane, seen, law)
+    force = (wanted[0] - found[0], wanted[1] - found[1], wanted[2] - found[2])
+    store3(memory, rows.FORCE, lane, force)
+    store3(memory, rows.ESTIMATE, lane, predicted_velocity(estimate, v, dot(force, b3), b3, law.adaptation))
+    store3(memory, rows.ESTIMATE + 3, lane, found)
 
 
 def ask_wrench(memory: FloatArray, lane: int, seen: int, law: Law, feed_forward: bool) -> None:
@@ -133,7 +166,19 @@ def ask_wrench(memory: FloatArray, lane: int, seen: int, law: Law, feed_forward:
 def command_rotors(memory: FloatArray, lane: int, law: Law, air: Airframe) -> None:
     """The paper's loop: rotor speeds for thrust and moment, within their limits."""
     thrust_N, x, y, z = load4(memory, rows.WRENCH, lane)
-    wanted = rotor_speeds(thrust_N, (x, y, z), law.allocation)
+    give_rotors(memory, lane, rotor_speeds(thrust_N, (x, y, z), law.allocation), air)
+
+
+def command_rotors_in_airflow(memory: FloatArray, lane: int, seen: int, law: Law, air: Airframe) -> None:
+    """The same, with what the present airflow does to the thrust."""
+    thrust_N, x, y, z = load4(memory, rows.WRENCH, lane)
+    airspeed_B = into_body(rotation_of(load4(memory, seen + 6, lane)), load3(memory, seen + 3, lane))
+    wanted = rotor_speeds_in_airflow(thrust_N, (x, y, z), law.allocation, airspeed_B, law.drag)
+    give_rotors(memory, lane, wanted, air)
+
+
+def give_rotors(memory: FloatArray, lane: int, wanted: Row4, air: Airframe) -> None:
+    """Command what the rotors can do, and note what they cannot."""
     low, high = air.speed_min, air.speed_max
     given = (
         clipped(wanted[0], low, high),

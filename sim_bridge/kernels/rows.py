@@ -87,9 +87,9 @@ GAP_START = SEEN + 13
 """First tick without pose."""
 GAP_END = GAP_START + 1
 """First tick with pose again."""
-PREDICTOR = GAP_END + 1
-"""6: velocity that the adaptive law predicts, m/s; the disturbance that it has found, N; world."""
-INTEGRAL = PREDICTOR + 6
+ESTIMATE = GAP_END + 1
+"""6: `control.adaptive.Estimate`."""
+INTEGRAL = ESTIMATE + 6
 """3: acceleration in m/s^2 that the flight loop's integral asks for."""
 SETPOINT = INTEGRAL + 3
 """4: thrust in counts; roll, pitch, yaw in deg."""

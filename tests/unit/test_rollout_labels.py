@@ -115,7 +115,10 @@ def test_waypoint_errors_between_ticks_are_interpolated_well() -> None:
     [
         ({"controller": "mystery"}, "controller 'mystery' is not known to the simulator; it has: geometric, "),
         ({"loop": "both"}, "loop 'both' is not known to the simulator; it has: paper, flight"),
-        ({"loop": "flight", "controller": "geometric-feed-forward"}, "acts on moments, which the flight loop leaves"),
+        *(
+            ({"loop": "flight", "controller": name}, f"controller '{name}' flies in the paper's loop only")
+            for name in ("geometric-feed-forward", "geometric-drag", "geometric-l1")
+        ),
     ],
 )
 def test_unknown_options_are_refused(change: dict[str, str], message: str) -> None:

@@ -14,9 +14,10 @@ from typing import Any
 from lcd_flight.cli.terminal import Terminal
 from lcd_flight.errors import InputError
 from lcd_flight.flight.clock import RealClock
+from lcd_flight.flight.realtime import prioritised
 from lcd_flight.mission import load_mission
 from lcd_flight.mission.airframe import vehicle_of
-from lcd_flight.model import LinkContext, Vector3, Vehicle
+from lcd_flight.model import LinkContext, PosePublisher, Vector3, Vehicle
 from lcd_flight.plugins import pose_publisher
 from lcd_flight.plugins.vehicle_servers import VehicleServer, vehicle_server
 from lcd_flight.worlds import load_vehicle
@@ -78,24 +79,29 @@ def serve(
         InputError: an option is wrong.
         RefusedError: the port or the endpoint is not to be had.
     """
-    with contextlib.ExitStack() as stack:
-        publish = None if bench.endpoint == NOWHERE else pose_publisher(bench.endpoint)
-        if publish is not None:
-            stack.callback(publish.close)
-        context = LinkContext(
-            vehicle=bench.vehicle,
-            clock=RealClock(),
-            initial_position_m=bench.position_m,
-            initial_yaw_rad=bench.yaw_rad,
-            seed=bench.seed,
-            publish_pose=publish,
-            rigid_body=bench.rigid_body,
-        )
-        server = vehicle_server(name, address, options, context)
-        return asyncio.run(_served(server, bench, terminal, seconds))
+    publishers: list[PosePublisher] = []
+
+    def publish(data: bytes) -> None:
+        for publisher in publishers:
+            publisher(data)
+
+    context = LinkContext(
+        vehicle=bench.vehicle,
+        clock=RealClock(),
+        initial_position_m=bench.position_m,
+        initial_yaw_rad=bench.yaw_rad,
+        seed=bench.seed,
+        publish_pose=publish,
+        rigid_body=bench.rigid_body,
+    )
+    server = vehicle_server(name, address, options, context)
+    return asyncio.run(_served(server, publishers, bench, terminal, seconds))
 
 
-async def _served(server: VehicleServer, bench: Bench, terminal: Terminal, seconds: float | None) -> dict[str, Any]:
+async def _served(
+    server: VehicleServer, publishers: list[PosePublisher], bench: Bench, terminal: Terminal, seconds: float | None
+) -> dict[str, Any]:
+    """Compile, then ask for priority, then open motion capture: its thread has the priority, compiling has not."""
     terminal.announce_compilation()
     events: deque[str] = deque(maxlen=EVENTS)
 
@@ -104,11 +110,21 @@ async def _served(server: VehicleServer, bench: Bench, terminal: Terminal, secon
         terminal.line("VEHICLE", text)
 
     async with server:
-        terminal.line("SIM", f"{server.description} at {server.uri}; Ctrl-C ends it")
-        if bench.endpoint != NOWHERE:
-            terminal.detail(f"poses of {bench.rigid_body} at {bench.endpoint}")
-        await _until_told(server, say, seconds)
+        with prioritised() as objection, contextlib.ExitStack() as stack:
+            if bench.endpoint != NOWHERE:
+                publishers.append(pose_publisher(bench.endpoint))
+                stack.callback(publishers[0].close)
+            _announce(server, bench, terminal, objection)
+            await _until_told(server, say, seconds)
     return {"uri": server.uri, "vehicle": server.description, "events": list(events)}
+
+
+def _announce(server: VehicleServer, bench: Bench, terminal: Terminal, objection: str) -> None:
+    terminal.line("SIM", f"{server.description} at {server.uri}; Ctrl-C ends it")
+    if bench.endpoint != NOWHERE:
+        terminal.detail(f"poses of {bench.rigid_body} at {bench.endpoint}")
+    if objection:
+        terminal.warn(objection)
 
 
 async def _until_told(server: VehicleServer, say: Callable[[str], None], seconds: float | None) -> None:

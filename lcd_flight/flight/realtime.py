@@ -31,6 +31,16 @@ def realtime() -> Iterator[tuple[str, ...]]:
 
 
 @contextlib.contextmanager
+def prioritised() -> Iterator[str]:
+    """Real-time priority alone, undone at the end: for what must keep time and may live for days.
+
+    Yields why it was not permitted, or nothing.
+    """
+    with contextlib.ExitStack() as stack:
+        yield _take_priority(stack)
+
+
+@contextlib.contextmanager
 def _without_collection() -> Iterator[None]:
     was_enabled = gc.isenabled()
     gc.collect()

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from lcd_flight.flight.realtime import PRIORITY, SWITCH_INTERVAL_S, realtime
+from lcd_flight.flight.realtime import PRIORITY, SWITCH_INTERVAL_S, prioritised, realtime
 
 
 class System:
@@ -50,6 +50,17 @@ def test_goes_on_without_what_is_not_and_says_so(monkeypatch: pytest.MonkeyPatch
         assert "no real-time priority (Operation not permitted)" in notes[0]
         assert "memory not locked (Cannot allocate memory)" in notes[1]
     assert system.calls == [("lock", 3)]
+
+
+def test_priority_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    system = System(monkeypatch, permits=True)
+    with prioritised() as objection:
+        assert (objection, gc.isenabled()) == ("", True)
+        assert system.calls == [(os.SCHED_FIFO, PRIORITY)]
+    assert system.calls[1:] == [(os.SCHED_OTHER, 0)]
+    system.permits = False
+    with prioritised() as objection:
+        assert "no real-time priority" in objection
 
 
 @pytest.mark.parametrize("fails", [False, True])

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from drivers.crazyflie import crtp_wire
 from lcd_flight.model import AttitudeThrust, Quaternion
-from lcd_flight.model.frames import body_x_axis, body_z_axis, from_yaw, multiply, rotate
+from lcd_flight.model.frames import body_x_axis, body_z_axis, from_yaw, multiply, rotate, seen_from_heading
 from sim_bridge.kernels.onboard import tilt_and_heading
 
 AHEAD = (1.0, 0.0, 0.0)
@@ -125,6 +125,8 @@ def test_it_is_what_rehearsals_fly(a: Quaternion, b: Quaternion) -> None:
     wanted, present = (tuple(np.array(q) / math.hypot(*q)) for q in (a, b))
     columns = [tuple(rotate(q, axis) for axis in np.eye(3).tolist()) for q in (wanted, present)]
     assume(all(math.hypot(x[0], x[1]) > 0.01 for x, _, _ in columns))  # a nose that points up has no heading
+    forward, _ = seen_from_heading(columns[0][2], columns[1][0])
+    assume(math.hypot(forward, columns[0][2][2]) > 0.01)  # nor has thrust to the side a pitch
     for ours, theirs in zip(
         crtp_wire.roll_pitch_yaw_deg(wanted, columns[1][0]), tilt_and_heading(*columns), strict=True
     ):

@@ -48,5 +48,5 @@ $(VENV)/.developing: $(VENV)/.flying
 	touch $@
 
 $(VENV)/.benching: $(VENV)/.flying
-	$(PIP) install --quiet --progress-bar on -c constraints.txt -e '.[bench]'
+	$(PIP) install --quiet --progress-bar on -c constraints.txt -e '.[bench,jaxopt]'
 	touch $@

@@ -14,23 +14,33 @@ import numpy as np
 from rotorpy.trajectories.minsnap import MinSnap
 from threadpoolctl import threadpool_limits
 
-from lcd_flight.model import FloatArray, Tasks, Trajectory
+from benchmarks.released_planner import planner
+from lcd_flight.model import FloatArray, RolloutOptions, Tasks, Trajectory
 from lcd_flight.planning.cost.features import FEATURE_NAMES, segment_features, segment_features_pullback
-from lcd_flight.planning.cost.model_file import load_model, model_names
+from lcd_flight.planning.cost.model_file import load_model
+from lcd_flight.planning.cost.proxy import ThrustProxy
 from lcd_flight.planning.cost.tracking_cost import CostModel
+from lcd_flight.planning.knots import Whitening
 from lcd_flight.planning.minimum_snap import minimum_snap, minimum_snap_batch
 from lcd_flight.planning.planner import plan_batch
+from lcd_flight.planning.polish import Candidate, polish
+from lcd_flight.planning.search import Arena
 from lcd_flight.planning.times import allocate
+from lcd_flight.worlds import load_world
+from sim_bridge.rollouts import MultirotorSimulator
 
 SPEED = 2.0
+MODEL = "crazyflie-paper"
 SECONDS = 0.5
 """Each side is repeated for about this long, and at least twice."""
 BATCH = 20_000
 SAME = 1e-3
 """Both sides must plan the same path, m; RotorPy's interior-point solver is this exact."""
 
-LEARNED = ((1, 3), (500, 3), (1, 50))
+LEARNED = ((1, 3), (500, 3), (1, 9), (1, 25), (1, 50), (1, 100))
 """Tasks at once, and segments of each."""
+POLISHED = ((1, 3), (200, 3), (1, 9), (1, 25), (1, 50), (1, 100))
+RELEASED = "jaxopt on the released objective"
 
 Report = Callable[[str], None]
 Row = dict[str, Any]
@@ -39,7 +49,7 @@ Row = dict[str, Any]
 def rows(report: Report) -> list[Row]:
     """All rows of `lcd bench plan`."""
     with threadpool_limits(1):
-        return [*minimum_snap_rows(report), *learned_rows(report)]
+        return [*minimum_snap_rows(report), *learned_rows(report), *polished_rows(report), *released_rows(report)]
 
 
 def minimum_snap_rows(report: Report) -> list[Row]:
@@ -64,10 +74,31 @@ def learned_rows(report: Report) -> list[Row]:
         _row_alone("features of a segment", "us", 1e6 * forward),
         _row_alone("pullback of the features of a segment", "us", 1e6 * backward),
     ]
-    for name in model_names()[:1]:
-        model = load_model(name)
-        measured += [_learned(model, tasks, segments, report) for tasks, segments in LEARNED]
-    return measured
+    model = load_model(MODEL)
+    return measured + [_learned(model, tasks, segments, report) for tasks, segments in LEARNED]
+
+
+def polished_rows(report: Report) -> list[Row]:
+    """The default of missions: solve, check, search in the simulator, check again."""
+    world = load_world("crazyflie-saturated")
+    arena = Arena(MultirotorSimulator(), world.vehicle(3), RolloutOptions(threads=1))
+    return [_polished(load_model(MODEL), arena, tasks, segments, report) for tasks, segments in POLISHED]
+
+
+def released_rows(report: Report) -> list[Row]:
+    """One plan of three segments, beside the released code's solver; without a peer where jaxopt is not installed."""
+    what = "learned plan, 3 segments, one task, beside the released planner"
+    report(what)
+    waypoints = _waypoints(1, 3)[0]
+    durations = allocate(waypoints, SPEED)
+    tasks, model = Tasks(waypoints[None, :, :3], waypoints[None, :, 3]), load_model(MODEL)
+    ours = _least_s(lambda: plan_batch(tasks, durations[None], model))
+    try:
+        released = planner(minimum_snap(waypoints, durations).coefficients)
+    except ImportError:
+        report("jaxopt is not installed: pip install 'lcd-flight[jaxopt]'")
+        return [_row_alone(what, "CPU ms", 1e3 * ours)]
+    return [_row(what, "CPU ms", 1e3 * ours, 1e3 * _least_s(lambda: released(waypoints, durations)), RELEASED)]
 
 
 def _segments(count: int) -> tuple[FloatArray, FloatArray]:
@@ -86,7 +117,24 @@ def _learned(model: CostModel, tasks: int, segments: int, report: Report) -> Row
     some = Tasks(poses[..., :3], poses[..., 3])
     durations = some.durations_s(SPEED)
     took = _least_s(lambda: plan_batch(some, durations, model)) / tasks
-    return _row_alone(what, "ms" if tasks == 1 else "ms a task", 1e3 * took)
+    return _row_alone(what, "CPU ms" if tasks == 1 else "CPU ms a task", 1e3 * took)
+
+
+def _polished(model: CostModel, arena: Arena, tasks: int, segments: int, report: Report) -> Row:
+    """As `learned-polished` plans: two solves, then the polish."""
+    what = f"learned-polished plan, {segments} segments, " + ("one task" if tasks == 1 else f"{tasks} tasks at once")
+    report(what)
+    poses = _waypoints(tasks, segments)
+    some = Tasks(poses[..., :3], poses[..., 3])
+    durations = some.durations_s(SPEED)
+
+    def work() -> None:
+        solved = [plan_batch(some, durations, cost) for cost in (model, ThrustProxy())]
+        space = Whitening.of(poses, durations)
+        candidates = [*(Candidate(s.z, s.theta) for s in solved), Candidate.minimum_snap(space)]
+        polish(space, candidates, arena, seed=0, tasks=np.arange(tasks))
+
+    return _row_alone(what, "CPU ms" if tasks == 1 else "CPU ms a task", 1e3 * _least_s(work) / tasks)
 
 
 def _row_alone(what: str, unit: str, ours: float) -> Row:

@@ -21,7 +21,7 @@ import zmq
 
 from lcd_flight import api
 from lcd_flight.flight.recording import Recording
-from lcd_flight.flight.replay import replayed
+from lcd_flight.flight.replay import compare, replayed
 from lcd_flight.flight.session import FlightOptions
 from lcd_flight.model import Observer, Outcome, RefusedError, Tick, TickInputs
 from lcd_flight.observers import LivePublisher, LiveStream, LogThread
@@ -66,6 +66,7 @@ def test_a_flight_leaves_a_log_with_what_was_predicted_and_tells_other_observers
     assert leg.waypoints is not None
     assert (prediction.method, prediction.segment_errors_m) == ("minimum-snap", None)
     assert listener.closed == 1
+    assert compare(read_ticks(flown.log), short_mission.setup()).equal
 
 
 def test_a_flight_that_is_refused_before_its_first_tick_leaves_no_log(tmp_path: Path, taken_endpoint: str) -> None:

@@ -9,7 +9,7 @@ from lcd_flight.learning import sources
 from lcd_flight.learning.rebuild import trajectories, variables
 from lcd_flight.learning.rollouts import Source
 from lcd_flight.learning.sources import optima, random_plans, retimed_plans, training_tasks, turns_short
-from lcd_flight.learning.targets import targets
+from lcd_flight.learning.targets import targets, whole_targets
 from lcd_flight.model import RolloutLabels
 from lcd_flight.planning.minimum_snap import minimum_snap_batch, snap
 from lcd_flight.worlds import load_world
@@ -106,10 +106,10 @@ def labels(segments, yaw_cost=0.0):
 
 def test_targets_by_hand():
     found = targets(labels([[0.1, 0.2, 0.4], [1e-6, 0.5, 9.0]], yaw_cost=0.0))
-    assert np.allclose(np.exp(found.segment), [[0.1, 0.2, 0.4], [0.01, 0.5, 5.0]])
+    assert np.allclose(np.exp(found.row), [[0.1, 0.2, 0.4], [0.01, 0.5, 5.0]])
     assert np.allclose(np.exp(found.rollout), [0.4, 5.0])
     assert found.kept.all()
-    assert np.allclose(np.exp(targets(labels([[0.3]], yaw_cost=1.6)).segment), 0.5)
+    assert np.allclose(np.exp(targets(labels([[0.3]], yaw_cost=1.6)).row), 0.5)
 
 
 def test_what_follows_a_lost_segment_is_left_out():
@@ -120,4 +120,13 @@ def test_what_follows_a_lost_segment_is_left_out():
         [True, True, True],
         [True, True, False],
     ]
-    assert np.isfinite(found.segment).all()
+    assert np.isfinite(found.row).all()
+
+
+def test_targets_of_whole_trajectories_leave_nothing_out():
+    flown = replace(labels([[0.1, 2.5, 0.3], [0.1, 3.0, np.nan]]), released_cost=np.array([np.e, 0.0]))
+    assert np.allclose(np.exp(whole_targets(flown, "error").row), [[2.5], [3.0]])
+    released = whole_targets(flown, "released")
+    assert np.allclose(released.row, [[1.0], [np.log(1e-6)]])
+    assert released.kept.all()
+    assert np.array_equal(released.rollout, released.row[:, 0])

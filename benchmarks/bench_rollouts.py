@@ -15,15 +15,16 @@ from typing import Any
 
 import numpy as np
 import torch
-from rotorpy.controllers.quadrotor_control import BatchedSE3Control, SE3Control
+from rotorpy.controllers.quadrotor_control import SE3Control
 from rotorpy.environments import Environment
 from rotorpy.sensors.imu import BatchedImu
 from rotorpy.simulate import simulate_batch
-from rotorpy.vehicles.multirotor import BatchedMultirotor, BatchedMultirotorParams, Multirotor
+from rotorpy.vehicles.multirotor import Multirotor
 from rotorpy.wind.default_winds import BatchedNoWind
 from rotorpy.world import World
 from threadpoolctl import threadpool_limits
 
+from benchmarks.rotorpy_batched import batch_of
 from lcd_flight.learning.sampling import first_tasks
 from lcd_flight.model import FloatArray, Loop, RolloutOptions, Trajectories, Trajectory
 from lcd_flight.planning.minimum_snap import minimum_snap_batch
@@ -38,8 +39,12 @@ COUNT = 4096
 REPEATS = 5
 """The best counts: what disturbs a measurement only ever slows it down."""
 SINGLE_FLIGHTS = 2
-BATCHES = (500, 2000, 8000)
+BATCHES = (500, 1000, 2000, 4000, 8000, 16000)
 """Sizes that RotorPy is tried with; its best counts."""
+FLOP_PER_TICK = 2291
+"""Additions, multiplications, divisions and square roots of a tick in the paper's loop with noise, as counted in the
+machine code of the loops over lanes; one that is fused counts as two (decision 0083)."""
+PEAK_NUMBERS, PEAK_ROUNDS, PEAK_CHAIN = 128, 100_000, 32
 BATCH_TICKS = 10
 BOUNDS = (-100.0, 100.0) * 3
 """Of RotorPy's world, m."""
@@ -61,20 +66,31 @@ def rows(report: Report) -> list[Row]:
         report(f"RotorPy single, {SINGLE_FLIGHTS} rollouts")
         few = plans.take(range(SINGLE_FLIGHTS))
         single = {"RotorPy single": _rotorpy_simulate(few), "RotorPy single, bare": _rotorpy_single(few)}
-        batched = {"RotorPy batched": 0.0, "RotorPy batched, bare": 0.0}
-        for size in BATCHES:
-            report(f"RotorPy batched rk4, {size} vehicles")
-            for name, measure in zip(batched, (_rotorpy_simulate_batch, _rotorpy_batched), strict=True):
-                batched[name] = max(batched[name], measure(tasks_flown(size)))
+        batched = _best_batches(report)
+        ceilings = {"multiply and add in registers": peak_rate(), "numpy's matrix product": product_rate()}
     unit, ticks = "ticks/CPU-s", float(np.mean(_ticks(plans)))
     what = "paper's loop, noise on, 1 core"
     rollouts = f"rollouts of {ticks / 100.0:.1f} s, paper's loop, 1 core"
+    arithmetic = f"arithmetic, {FLOP_PER_TICK:,} operations a tick, 1 core"
     return [
-        *(_row(what, unit, paper, peer, name) for name, peer in {**single, **batched}.items()),
+        *(_row(what, unit, paper, peer, name) for name, peer in single.items()),
+        *(_row(f"{what}; its best batch, {size}", unit, paper, peer, name) for name, (peer, size) in batched.items()),
         _row(rollouts, "1/CPU-s", paper / ticks, single["RotorPy single"] / ticks, "RotorPy single"),
+        *(_row(arithmetic, "GFLOP/CPU-s", 1e-9 * paper * FLOP_PER_TICK, 1e-9 * c, n) for n, c in ceilings.items()),
         _row("flight loop, onboard PID at 500 Hz, noise on, 1 core", unit, flight),
         *(_row(f"{name} loop, {cores} cores", "ticks/s", ours) for name, ours in zip(LOOPS, on_all, strict=True)),
     ]
+
+
+def _best_batches(report: Report) -> dict[str, tuple[float, int]]:
+    """Both of RotorPy's batched measurements, each at the size that it is fastest with."""
+    measures = {"RotorPy batched": _rotorpy_simulate_batch, "RotorPy batched, bare": _rotorpy_batched}
+    best = dict.fromkeys(measures, (0.0, 0))
+    for size in BATCHES:
+        report(f"RotorPy batched rk4, {size} vehicles")
+        for name, measure in measures.items():
+            best[name] = max(best[name], (measure(tasks_flown(size)), size))
+    return best
 
 
 def tasks_flown(count: int) -> Trajectories:
@@ -139,7 +155,7 @@ def _rotorpy_single(plans: Trajectories) -> float:
 def _rotorpy_simulate_batch(plans: Trajectories) -> float:
     """Ticks per CPU second of its own batched simulation; rk4 is faster than its default dopri5."""
     count = len(plans)
-    craft, controller, state = batch_of(plans)
+    craft, controller, state = batch_of(plans, VEHICLE)
     imu, wind = BatchedImu(count, sampling_rate=100), BatchedNoWind(count)
     ends = np.full(count, 0.01 * BATCH_TICKS - 0.005)
     begun = time.process_time()
@@ -150,7 +166,7 @@ def _rotorpy_simulate_batch(plans: Trajectories) -> float:
 def _rotorpy_batched(plans: Trajectories) -> float:
     """Ticks per CPU second of its batched step and update alone."""
     count, everybody, wanted = len(plans), np.arange(len(plans)), First(plans)
-    craft, controller, state = batch_of(plans)
+    craft, controller, state = batch_of(plans, VEHICLE)
     control = controller.update(0.0, state, wanted.update(np.zeros(1)), everybody)
     begun = time.process_time()
     for tick in range(1, BATCH_TICKS + 1):
@@ -158,16 +174,6 @@ def _rotorpy_batched(plans: Trajectories) -> float:
         state = craft.step(state, control, 0.01, everybody)
         control = controller.update(0.01 * tick, state, wanted.update(np.array([0.01 * tick])), everybody)
     return count * BATCH_TICKS / (time.process_time() - begun)
-
-
-def batch_of(plans: Trajectories) -> tuple[BatchedMultirotor, BatchedSE3Control, dict[str, Any]]:
-    """Its vehicles, their controller and their state at the plans' starts."""
-    count, device = len(plans), torch.device("cpu")
-    shared = BatchedMultirotorParams([rotorpy_adapter.parameters(VEHICLE)] * count, count, device)
-    starts = [rotorpy_adapter.initial_state(plan, VEHICLE, start_aligned=True) for plan in plans]
-    state = {key: torch.from_numpy(np.stack([start[key] for start in starts])) for key in starts[0]}
-    craft = BatchedMultirotor(shared, count, state, device, integrator="rk4")
-    return craft, BatchedSE3Control(shared, count, device), state
 
 
 class First:
@@ -186,6 +192,42 @@ class First:
             **{"x": position[:, :3], "x_dot": velocity[:, :3], "x_ddot": acceleration[:, :3]},
             **{"yaw": position[:, 3], "yaw_dot": velocity[:, 3]},
         }
+
+
+def peak_rate() -> float:
+    """Floating-point operations per CPU second of one thread that does nothing but multiply and add in registers."""
+    import numba
+
+    multiply = numba.njit(fastmath={"contract"})(_multiply_and_add)
+    numbers = np.linspace(0.0, 1.0, PEAK_NUMBERS)
+    multiply(numbers, 1)
+    best = np.inf
+    for _ in range(REPEATS):
+        begun = time.process_time()
+        multiply(numbers, PEAK_ROUNDS)
+        best = min(best, time.process_time() - begun)
+    return 2.0 * PEAK_CHAIN * PEAK_NUMBERS * PEAK_ROUNDS / best
+
+
+def _multiply_and_add(numbers: FloatArray, rounds: int) -> None:
+    for _ in range(rounds):
+        for i in range(len(numbers)):
+            value = numbers[i]
+            for _ in range(PEAK_CHAIN):
+                value = value * 0.999 + 1e-3
+            numbers[i] = value
+
+
+def product_rate() -> float:
+    """Floating-point operations per CPU second of a product of matrices, as numpy's library does it."""
+    size = 1024
+    matrix = np.random.default_rng(0).random((size, size))
+    best = np.inf
+    for _ in range(REPEATS):
+        begun = time.process_time()
+        matrix @ matrix
+        best = min(best, time.process_time() - begun)
+    return 2.0 * size**3 / best
 
 
 def _row(what: str, unit: str, ours: float, peer: float | None = None, peer_name: str | None = None) -> Row:

@@ -29,7 +29,7 @@ CALM_SPEED = 1.1
 
 
 def rotorpy_crash_rates(
-    flights: int = 50, rows: int = 3, tasks: int = 500, batch: int = 250, parts: Path = PARTS
+    flights: int = 50, rows: int = 3, tasks: int = 500, batch: int = 500, parts: Path = PARTS
 ) -> dict[str, Any]:
     """Largest differences in m without noise, and crashes in % with it, of the same plans.
 

@@ -22,6 +22,7 @@ def bench():
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     module.COUNT, module.REPEATS, module.SINGLE_FLIGHTS, module.BATCHES, module.BATCH_TICKS = 64, 1, 1, (4,), 3
+    module.PEAK_ROUNDS = 100
     return module
 
 
@@ -51,7 +52,7 @@ def test_the_batched_peer_is_the_single_one(bench, monkeypatch):
     """Without noise, over a few ticks: the same flight, as far as its single-precision rk4 goes."""
     monkeypatch.setattr(bench, "VEHICLE", replace(bench.VEHICLE, motor_noise=0.0))
     plans = bench.tasks_flown(2)
-    craft, controller, state = bench.batch_of(plans)
+    craft, controller, state = bench.batch_of(plans, bench.VEHICLE)
     wanted, everybody = bench.First(plans), np.arange(2)
     control = controller.update(0.0, state, wanted.update(np.zeros(1)), everybody)
     for tick in range(1, 21):

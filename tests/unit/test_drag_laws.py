@@ -83,7 +83,7 @@ def test_three_sweeps_solve_it(vehicle: Vehicle) -> None:
     """In ordinary flight: to a hundredth of the weight."""
     rng, drag = np.random.default_rng(3), model_of(vehicle)
     for _ in range(50):
-        alpha = vehicle.mass_kg * (rng.normal(size=3) + [0.0, 0.0, G])
+        alpha = vehicle.mass_kg * (rng.normal(size=3) + np.array([0.0, 0.0, G]))
         v, yaw = 1.5 * rng.normal(size=3), float(rng.uniform(-4.0, 4.0))
         ours = force_against_drag(vector(alpha), vector(v), (math.cos(yaw), math.sin(yaw)), drag)
         assert np.allclose(ours, swept(alpha, v, yaw, drag, 60), atol=1e-2 * vehicle.weight_N)

@@ -18,12 +18,11 @@ from benchmarks.released_planner import planner
 from lcd_flight.model import FloatArray, RolloutOptions, Tasks, Trajectory
 from lcd_flight.planning.cost.features import FEATURE_NAMES, segment_features, segment_features_pullback
 from lcd_flight.planning.cost.model_file import load_model
-from lcd_flight.planning.cost.proxy import ThrustProxy
 from lcd_flight.planning.cost.tracking_cost import CostModel
 from lcd_flight.planning.knots import Whitening
 from lcd_flight.planning.minimum_snap import minimum_snap, minimum_snap_batch
 from lcd_flight.planning.planner import plan_batch
-from lcd_flight.planning.polish import Candidate, polish
+from lcd_flight.planning.polish import candidates_of, polish
 from lcd_flight.planning.search import Arena
 from lcd_flight.planning.times import allocate
 from lcd_flight.worlds import load_world
@@ -121,7 +120,7 @@ def _learned(model: CostModel, tasks: int, segments: int, report: Report) -> Row
 
 
 def _polished(model: CostModel, arena: Arena, tasks: int, segments: int, report: Report) -> Row:
-    """As `learned-polished` plans: two solves, then the polish."""
+    """As `learned-polished` plans."""
     what = f"learned-polished plan, {segments} segments, " + ("one task" if tasks == 1 else f"{tasks} tasks at once")
     report(what)
     poses = _waypoints(tasks, segments)
@@ -129,10 +128,8 @@ def _polished(model: CostModel, arena: Arena, tasks: int, segments: int, report:
     durations = some.durations_s(SPEED)
 
     def work() -> None:
-        solved = [plan_batch(some, durations, cost) for cost in (model, ThrustProxy())]
-        space = Whitening.of(poses, durations)
-        candidates = [*(Candidate(s.z, s.theta) for s in solved), Candidate.minimum_snap(space)]
-        polish(space, candidates, arena, seed=0, tasks=np.arange(tasks))
+        solved, space = plan_batch(some, durations, model), Whitening.of(poses, durations)
+        polish(space, candidates_of(space, solved), arena, seed=0, tasks=np.arange(tasks))
 
     return _row_alone(what, "CPU ms" if tasks == 1 else "CPU ms a task", 1e3 * _least_s(work) / tasks)
 

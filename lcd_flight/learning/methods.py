@@ -26,7 +26,7 @@ from lcd_flight.planning.cost.tracking_cost import CostModel
 from lcd_flight.planning.knots import Whitening
 from lcd_flight.planning.minimum_snap import minimum_snap_batch
 from lcd_flight.planning.planner import PlannerOptions, PlanResult, Timing, TrackingCost, plan_batch
-from lcd_flight.planning.polish import Candidate, polish
+from lcd_flight.planning.polish import candidates_of, polish
 from lcd_flight.planning.released import plan_released
 from lcd_flight.planning.search import Arena, SearchSettings
 from lcd_flight.planning.search import search as search_in_simulator
@@ -156,12 +156,12 @@ def learned_polished(problem: Problem) -> Planned:
     Raises:
         InputError: as `learned`.
     """
-    return _polished(problem, [_solve(problem, *_learned_cost(problem, problem.model)), _solve_analytic(problem)])
+    return _polished(problem, _solve(problem, *_learned_cost(problem, problem.model)))
 
 
 def analytic_polished(problem: Problem) -> Planned:
     """The same without learning: what the polish itself is worth."""
-    return _polished(problem, [_solve_analytic(problem)])
+    return _polished(problem, _solve_analytic(problem))
 
 
 def _learned_cost(problem: Problem, name: str) -> tuple[TrackingCost, PlannerOptions]:
@@ -189,11 +189,14 @@ def _solved(result: PlanResult) -> Planned:
     return Planned(result.plans, np.array([reason is not None for reason in result.fallback]))
 
 
-def _polished(problem: Problem, solved: list[PlanResult]) -> Planned:
+def _polished(problem: Problem, solved: PlanResult) -> Planned:
     space = Whitening.of(problem.tasks.poses, problem.durations_s)
-    candidates = [Candidate(s.z, s.theta) for s in solved] + [Candidate.minimum_snap(space)]
-    result = polish(space, candidates, problem.arena, seed=problem.seed, tasks=problem.indices, timing=problem.timing)
-    return Planned(result.plans, _solved(solved[0]).fell_back)
+    candidates = candidates_of(space, solved)
+    plans = polish(
+        space, candidates, problem.arena, seed=problem.seed, tasks=problem.indices, timing=problem.timing
+    ).plans
+    same = (plans.coefficients == space.minimum.coefficients).all(axis=(1, 2, 3))
+    return Planned(plans, same)
 
 
 METHODS: dict[str, Method] = {

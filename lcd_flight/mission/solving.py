@@ -21,7 +21,7 @@ from lcd_flight.planning.cost.tracking_cost import CostModel
 from lcd_flight.planning.knots import Whitening
 from lcd_flight.planning.minimum_snap import minimum_snap
 from lcd_flight.planning.planner import ErrorPredictor, PlannerOptions, PlanResult, Timing, TrackingCost, plan_task
-from lcd_flight.planning.polish import Candidate, PolishSettings, polish
+from lcd_flight.planning.polish import PolishSettings, candidates_of, polish
 from lcd_flight.planning.search import Arena
 
 POLISHED = "-polished"
@@ -102,11 +102,7 @@ class Solver:
     def _polished(self, task: TrajectoryTask, result: PlanResult, options: PlannerOptions) -> Trajectory:
         """The best of this solve, the analytic one and minimum snap, searched from; as the flight loop flies it."""
         space = Whitening.of(task.waypoints[None], task.durations_s[None])
-        solved = [result]
-        if not isinstance(self.cost, ThrustProxy):
-            analytic = PlannerOptions(options.timing, ANALYTIC_SNAP_WEIGHT)
-            solved.append(plan_task(task.waypoints, task.durations_s, ThrustProxy(), analytic))
-        candidates = [Candidate(s.z, s.theta) for s in solved] + [Candidate.minimum_snap(space)]
+        candidates = candidates_of(space, result)
         assert self.simulator is not None  # noqa: S101 - a method that polishes is made with one
         arena = Arena(self.simulator, self.vehicle, RolloutOptions(loop="flight"))
         numbers = np.zeros(1, dtype=np.int64)

@@ -110,6 +110,10 @@ class PlanResult:
     """(N, S - 1, 3, 4) what the solve found (`Whitening.plan`), also where it fell back: data for training."""
     theta: FloatArray
     """(N, S) likewise."""
+    start_z: FloatArray
+    """(N, S - 1, 3, 4) where the solve first began: what the analytic cost gave, or zeros."""
+    start_theta: FloatArray
+    """(N, S) likewise."""
     fallback: tuple[str | None, ...]
     """For each row None, or why it is minimum snap."""
 
@@ -195,6 +199,8 @@ def _solved(whitening: Whitening, cost: TrackingCost, options: PlannerOptions) -
         best_iteration=np.where(kept, descent.best_iteration, 0),
         z=z,
         theta=theta,
+        start_z=objective.unpack(start)[0],
+        start_theta=objective.unpack(start)[1],
         fallback=reasons,
     )
 
@@ -288,11 +294,12 @@ def _joined(parts: list[PlanResult]) -> PlanResult:
 
 
 def _patched(result: PlanResult, rows: IntArray, other: PlanResult) -> PlanResult:
-    """`result` with these rows taken from `other`."""
+    """`result` with these rows taken from `other`, but for where the first solve began."""
     order = np.arange(len(result))
     order[rows] = len(result) + np.arange(len(rows))
     both = _joined([result, other])
-    return PlanResult(**{f.name: _taken(getattr(both, f.name), order) for f in fields(PlanResult)})
+    patched = PlanResult(**{f.name: _taken(getattr(both, f.name), order) for f in fields(PlanResult)})
+    return replace(patched, start_z=result.start_z, start_theta=result.start_theta)
 
 
 def _taken(values: Any, order: IntArray) -> Any:

@@ -16,7 +16,7 @@ import numpy as np
 from lcd_flight.model import FloatArray, IntArray, RolloutLabels, SeedArray, Trajectories
 from lcd_flight.model.streams import Stream
 from lcd_flight.planning.knots import Whitening
-from lcd_flight.planning.planner import Timing
+from lcd_flight.planning.planner import PlanResult, Timing
 from lcd_flight.planning.search import Arena, SearchSettings, search, tracking_cost
 
 
@@ -53,6 +53,14 @@ class Candidate:
     def minimum_snap(space: Whitening) -> Candidate:
         """Zeros."""
         return Candidate(np.zeros(space.z_shape), np.zeros(space.durations_s.shape))
+
+
+def candidates_of(space: Whitening, solved: PlanResult) -> list[Candidate]:
+    """What a solve offers: its plan, where it began (the analytic plan) if that was not minimum snap, minimum snap."""
+    found = [Candidate(solved.z, solved.theta)]
+    if solved.start_z.any() or solved.start_theta.any():
+        found.append(Candidate(solved.start_z, solved.start_theta))
+    return [*found, Candidate.minimum_snap(space)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

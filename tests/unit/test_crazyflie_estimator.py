@@ -8,7 +8,7 @@ import struct
 import pytest
 from virtual_crazyflie import HOVER, Client, rpyt
 
-from lcd_flight.model.frames import angle_between, from_yaw
+from lcd_flight.model.frames import angle_between, from_yaw, tilt_of, yaw_of
 from sim_bridge.crazyflie.crtp import Packet, Port
 from sim_bridge.crazyflie.estimator import Estimator
 from sim_bridge.crazyflie.poses import compressed, decode_pose, decompressed
@@ -116,6 +116,16 @@ def test_a_senseless_standard_deviation_does_no_harm(client: Client, sigma: floa
     client.set("locSrv.extQuatStdDev", sigma)
     seen(client, 200.0)
     assert all(map(math.isfinite, (*estimator(client).state.p_WB, *estimator(client).attitude)))
+    assert "out of bounds" not in client.text
+
+
+def test_without_poses_the_heading_drifts_and_the_tilt_does_not() -> None:
+    """The accelerometer sees up and no north."""
+    client = Client(seed=2)
+    client.wait(60_000.0)
+    attitude = estimator(client).attitude
+    assert 0.1 < abs(math.degrees(yaw_of(attitude))) < 5.0
+    assert math.degrees(tilt_of(attitude)) < 0.5
 
 
 def test_the_estimate_follows_a_flight(client: Client) -> None:

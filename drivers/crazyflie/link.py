@@ -93,13 +93,15 @@ class CrazyflieLink:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Come down if it is still in the air, stop the motors, say so, close; no thread is left."""
+        sender = self._connection.sender
         try:
-            sender = self._connection.sender
             if sender is not None:
                 await self._come_down(sender)
                 await self._rest(sender)
         finally:
             self._armed = False
+            if sender is not None:  # who cancels this too cuts the motors: silence would keep them turning
+                sender.change(lambda box: box.rest())
             await self._connection.close()
 
     @property

@@ -97,6 +97,31 @@ def test_closing_in_the_air_descends_stops_says_so_and_locks_nothing() -> None:
     asyncio.run(main())
 
 
+def test_who_does_not_wait_for_the_descent_cuts_the_motors() -> None:
+    async def main() -> None:
+        async with bench() as made:
+            climbed = asyncio.Event()
+
+            async def fly() -> None:
+                async with made.link() as link:
+                    await climb(link)
+                    climbed.set()
+                    await wait_ms(60_000)
+
+            flying = asyncio.create_task(fly())
+            await climbed.wait()
+            flying.cancel()
+            await wait_ms(200)
+            assert not flying.done()  # it descends
+            flying.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await flying
+            assert made.path.sent_up(NOTIFY) == [crtp_wire.NOTIFY_STOP] * 3
+            assert not made.left_over()
+
+    asyncio.run(main())
+
+
 def test_a_lost_link_cuts_within_a_second_where_that_was_asked_for() -> None:
     """The watchdog is fed while the loop lives; the loop stops, the fallback flies, the vehicle cuts and is locked."""
 

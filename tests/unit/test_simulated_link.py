@@ -265,18 +265,14 @@ def test_the_dead_do_not_fall_back_even_where_both_are_noticed_at_once() -> None
     assert Notes.newest.timeline_ms == [(99.0, 1.0), (300.0, 0.0)]
 
 
-@pytest.mark.parametrize(
-    ("options", "mission_V", "expected_V"), [({}, None, 4.2), ({}, 3.7, 3.7), ({"battery_V": "3.1"}, 3.7, 3.1)]
-)
-def test_the_battery_is_that_of_the_option_then_of_the_mission(
-    options: dict[str, str], mission_V: float | None, expected_V: float
-) -> None:
+@pytest.mark.parametrize(("options", "expected_V"), [({}, 4.2), ({"battery_V": "3.1"}, 3.1)])
+def test_the_battery_is_full_or_that_of_the_option(options: dict[str, str], expected_V: float) -> None:
     async def script(link: SimulatedLink) -> None:
         telemetry = link.report(CLOCK.now_ns()).telemetry
         assert telemetry is not None
         assert telemetry.battery_V == expected_V
 
-    run(script, options, battery_V=mission_V)
+    run(script, options)
 
 
 def test_a_late_wake_up_goes_on_by_what_has_passed_and_skips_what_was_missed() -> None:

@@ -1,6 +1,6 @@
 """The projected solve: waypoints held exactly, tracking cost against extra snap, downhill from a good start.
 
-    min over z, theta of   weight * cost(plan) + lambda |z|^2 + lambda / 2 |theta|^2,   plan = Whitening.plan(z, theta)
+    min over z, theta of   weight * cost(plan) + lambda |z|^2 + mu |theta|^2,   plan = Whitening.plan(z, theta)
 
 This is the paper's problem 3 in variables that satisfy its constraints whatever they are, with its c'Hc counted
 relative to the least snap there is: |z|^2. Each row is solved by Adam, first on the analytic cost from minimum snap
@@ -65,6 +65,8 @@ class PlannerOptions:
     timing: Timing = "retimed"
     snap_weight: float = 0.1
     """lambda; a learned model's card holds the one that suits it."""
+    time_weight: float = 0.05
+    """mu; less than this, and long missions end in time allocations that the network is wrong about."""
     cost_weight: float = 1.0
     """What the tracking cost is multiplied by; a mission's `weight`."""
     iterations: int = 40
@@ -79,7 +81,7 @@ class PlannerOptions:
         Raises:
             InputError: a weight or step that is not positive and finite, or fewer than one iteration.
         """
-        for name in ("snap_weight", "cost_weight", "step"):
+        for name in ("snap_weight", "time_weight", "cost_weight", "step"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise InputError(f"{name} is {value}: it must be above 0 and finite")
@@ -234,7 +236,7 @@ class PlanObjective:
         cost, grad_durations, grad_coefficients = self._cost.value_and_gradient(plans.durations_s, plans.coefficients)
         grad_z, grad_theta = self._whitening.pullback(z, theta, grad_durations, grad_coefficients)
         weights = np.full(self.size, self._options.snap_weight)
-        weights[self._z_size :] *= 0.5
+        weights[self._z_size :] = self._options.time_weight
         value = self._options.cost_weight * cost + (variables**2 * weights).sum(axis=1)
         grad = np.concatenate([grad_z.reshape(len(variables), self._z_size), grad_theta], axis=1)
         grad = self._options.cost_weight * grad + 2.0 * weights * variables

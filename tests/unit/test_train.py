@@ -15,11 +15,13 @@ from lcd_flight.learning.policy import PolicyConfig, PolicyMix, collect_policy, 
 from lcd_flight.learning.rebuild import trajectories
 from lcd_flight.learning.recipes import RECIPES, TrainConfig
 from lcd_flight.learning.rollouts import Source
+from lcd_flight.learning.sampling import first_tasks
 from lcd_flight.learning.train import train
 from lcd_flight.learning.training_set import trains
-from lcd_flight.model import InputError
+from lcd_flight.model import InputError, RolloutOptions
 from lcd_flight.planning.cost.inputs import INPUTS
 from lcd_flight.planning.cost.model_file import check_fits, load_model
+from lcd_flight.planning.planner import PlannerOptions, plan_batch
 from lcd_flight.planning.search import SearchSettings
 from lcd_flight.plugins import simulator
 from lcd_flight.worlds import fingerprint, load_world
@@ -100,6 +102,31 @@ def test_it_is_evaluated_like_any_other_method(trained, sim):
     found = evaluate(WORLD, ["minimum-snap", "learned"], 60, sim, options).methods
     assert found["learned"].crash_rate < found["minimum-snap"].crash_rate
     assert found["learned"].tasks == 60
+
+
+def test_a_network_that_saw_optima_only_leads_astray(sim, tmp_path):
+    """The method's lesson at small scale: on raw inputs, trained on minimum snap alone, worse than minimum snap."""
+    mixed = replace(TINY, inputs="knots", rounds=0, members=1)
+    optima = replace(mixed, mix=replace(TINY.mix, search=0.0, random=0.0, optimum=1.0))
+    tasks = first_tasks(WORLD.sampler, 5, 150)
+    durations, seeds = tasks.durations_s(WORLD.speed), np.arange(150, dtype=np.uint64)
+
+    def crash_rate(plans):
+        return sim.rollout(plans, WORLD.vehicle(3), seeds, RolloutOptions()).crashed.mean()
+
+    rates = {}
+    for name, config in (("mixed", mixed), ("optima", optima)):
+        path = tmp_path / f"{name}.safetensors"
+        train(config, tmp_path / name, path, sim)
+        anywhere = np.full(39, 1e9)
+        cost = replace(load_model(path), feature_low=-anywhere, feature_high=anywhere)
+        result = plan_batch(tasks, durations, cost, PlannerOptions("fixed", 0.03, start="minimum-snap"))
+        rates[name] = sim.rollout(result.plans, WORLD.vehicle(3), seeds, RolloutOptions()).crashed.mean()
+        rates["minimum snap"] = sim.rollout(
+            result.minimum_snap, WORLD.vehicle(3), seeds, RolloutOptions()
+        ).crashed.mean()
+    assert rates["optima"] > rates["mixed"] + 0.1
+    assert rates["optima"] > rates["minimum snap"] + 0.1
 
 
 def test_a_second_run_does_nothing_and_gives_the_same_file(trained, sim, monkeypatch):

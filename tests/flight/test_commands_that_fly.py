@@ -68,7 +68,7 @@ def test_plan_only_stops_after_the_rehearsal(said: Any, tmp_path: Path) -> None:
     assert (code, facts["outcome"], facts["log"]) == (0, "ok", None)
     assert not any(tmp_path.iterdir())
     (trajectory,) = facts["trajectories"]
-    assert trajectory["method"] == "learned"
+    assert trajectory["method"] == "learned-polished"
     assert trajectory["predicted_max_error_m"] < trajectory["minimum_snap_predicted_max_error_m"]
 
 
@@ -82,7 +82,8 @@ def test_no_arm_turns_no_motor(said: Any, tmp_path: Path) -> None:
 
 def test_a_refused_rehearsal_exits_with_3(said: Any, tmp_path: Path) -> None:
     mission = tmp_path / "mission.yaml"
-    mission.write_text((MISSIONS / "saturating_task.yaml").read_text().replace("type: learned", "type: minimum-snap"))
+    text = (MISSIONS / "saturating_task.yaml").read_text()
+    mission.write_text(text.replace("type: learned-polished", "type: minimum-snap"))
     code, facts, _ = said(flyer, str(mission), "--fast", "--log", str(tmp_path / "log"))
     assert (code, facts["outcome"]) == (3, "refused")
     assert "trouble begins in" in facts["error"]
@@ -112,7 +113,8 @@ def test_a_port_in_use_is_refused(said: Any, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (("--link", "radio://0/80/2M/E7E7E7E7E7"), "unknown link"),
+        (("--link", "carrier-pigeon://0"), "unknown link"),
+        (("--link", "radio://0/80/2M/E7E7E7E7E7"), "--fast flies the simulator only"),
         (("--link", "sim://?no_such=1"), "no_such"),
         (("--link", "nonsense"), "not a URI"),
     ],
@@ -172,7 +174,7 @@ def test_a_path_refused_says_that_the_learned_plan_was_not_used(said: Any, tmp_p
     slow = (
         FOUR.read_text().replace("speed: 1.5 ", "speed: 0.2 ").replace("max: [4.5, 4.5, 3.5]", "max: [2.6, 2.6, 1.9]")
     )
-    mission.write_text(slow)
+    mission.write_text(slow.replace("type: learned-polished", "type: learned"))
     code, facts, _ = said(app, "plan", str(mission))
     assert code == 3
     assert "outside safety.geofence" in facts["error"]

@@ -21,7 +21,7 @@ def test_there_are_at_least_four() -> None:
     assert len(LEARNED) >= 4
 
 
-LEARNED = [path for path in sorted(MISSIONS.glob("*.yaml")) if load_mission(path).planner.type == "learned"]
+LEARNED = [path for path in sorted(MISSIONS.glob("*.yaml")) if load_mission(path).planner.type.startswith("learned")]
 
 
 @pytest.mark.parametrize("path", LEARNED, ids=lambda path: path.stem)
@@ -29,7 +29,7 @@ def test_the_shipped_model_plans_them_and_they_pass_the_rehearsal(path: Path) ->
     flight = api.plan(path)
     for summary in flight.planned.summaries:
         assert summary.fallback is None
-        assert summary.method == "learned"
+        assert summary.method == "learned-polished"
         assert summary.predicted_max_error_m < summary.minimum_snap_predicted_max_error_m
     rehearsal = api.rehearse(flight)
     assert rehearsal.passed, rehearsal.text
@@ -37,7 +37,7 @@ def test_the_shipped_model_plans_them_and_they_pass_the_rehearsal(path: Path) ->
 
 
 def test_minimum_snap_saturates_on_the_saturating_task_and_is_refused(tmp_path: Path) -> None:
-    text = SATURATING.read_text().replace("type: learned", "type: minimum-snap")
+    text = SATURATING.read_text().replace("type: learned-polished", "type: minimum-snap")
     mission = tmp_path / "minimum_snap.yaml"
     mission.write_text(text)
     rehearsal = api.rehearse(api.plan(mission))
@@ -54,7 +54,7 @@ def test_the_saturating_task_is_a_sampled_one() -> None:
     mission = load_mission(SATURATING)
     title = SATURATING.read_text().splitlines()[1].removeprefix("# ")
     assert SATURATING.read_text() == task_mission(
-        title, mission.name, task, world.speed, vehicle="crazyflie", planner="learned"
+        title, mission.name, task, world.speed, vehicle="crazyflie", planner="learned-polished"
     )
 
 

@@ -178,7 +178,7 @@ def test_a_flight_longer_than_the_battery_is_refused() -> None:
 
 def test_every_refusal_is_told_with_its_line(tmp_path: Path) -> None:
     text = Path(__file__).parents[2].joinpath("missions", "four_waypoints.yaml").read_text(encoding="utf-8")
-    text = text.replace("type: learned", "type: minimum-snap").replace("speed: 1.5", "speed: 2.37")
+    text = text.replace("type: learned-polished", "type: minimum-snap").replace("speed: 1.5", "speed: 2.37")
     path = tmp_path / "fast.yaml"
     path.write_text(text, encoding="utf-8")
     described = load_mission(path)
@@ -213,7 +213,7 @@ def test_a_damaged_model_is_told_with_file_line_and_key(tmp_path: Path) -> None:
     (tmp_path / "bad.safetensors").write_bytes(data)
     mission = tmp_path / "mission.yaml"
     text = (Path(__file__).parents[2] / "missions" / "four_waypoints.yaml").read_text()
-    mission.write_text(text.replace("type: learned\n", "type: learned\n  model: bad.safetensors\n"))
+    mission.write_text(text.replace("type: learned-polished\n", "type: learned\n  model: bad.safetensors\n"))
     loaded = load_mission(mission)
     with pytest.raises(InputError, match=r"mission\.yaml:\d+: planner\.model: .*checksum"):
         load_cost(loaded, vehicle_of(loaded))

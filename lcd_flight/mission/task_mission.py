@@ -47,7 +47,14 @@ rehearse: {{runs: 100, faults: [motor_noise, mocap_dropout]}}
 
 
 def task_mission(
-    title: str, name: str, waypoints: FloatArray, speed: float, *, vehicle: str, planner: str = "learned-polished", seed: int = 0
+    title: str,
+    name: str,
+    waypoints: FloatArray,
+    speed: float,
+    *,
+    vehicle: str,
+    planner: str = "learned-polished",
+    seed: int = 0,
 ) -> str:
     """The text of a mission that flies one task, lifted clear of the ground, in a room that leaves space around it.
 

@@ -214,7 +214,8 @@ ONE_PROBLEM = {
     "unknown planner": (
         "type: learned",
         "type: learnt",
-        '13: planner.type: "learnt" is not possible here; did you mean learned? (one of learned-polished, learned, analytic-polished, analytic, minimum-snap)',
+        '13: planner.type: "learnt" is not possible here; did you mean learned? '
+        "(one of learned-polished, learned, analytic-polished, analytic, minimum-snap)",
     ),
     "unknown fault": (
         "faults: [motor_noise]",

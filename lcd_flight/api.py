@@ -31,10 +31,10 @@ from lcd_flight.mission.plan_csv import planned_from_csv
 from lcd_flight.mission.plan_file import planned_from_file, write_plan
 from lcd_flight.mission.plan_mission import plan_mission
 from lcd_flight.mission.planned import PlannedMission
-from lcd_flight.model import LegKind, Observer, Vehicle
+from lcd_flight.model import InputError, LegKind, Observer, Vehicle
 from lcd_flight.observers.live import ENDPOINT as LIVE_ENDPOINT
 from lcd_flight.observers.log_thread import LogStatistics
-from lcd_flight.record import FlightHeader, Prediction, log_path, read_log
+from lcd_flight.record import FlightHeader, FlightLog, Prediction, log_path, read_log
 from lcd_flight.record.machine import this_machine
 from lcd_flight.rehearsal.rehearse import rehearse as fly_in_simulation
 from lcd_flight.rehearsal.verdict import Rehearsal
@@ -61,7 +61,8 @@ class FlownMission:
     figures: FlightFigures
     log: Path
     log_statistics: LogStatistics
-    report: Path
+    report: Path | None
+    """The review page; None where it could not be written, which the result's notes tell."""
 
 
 def plan(
@@ -148,9 +149,17 @@ def fly(
             flight.mission, flight.planned.plan, flight.vehicle, options, observers=listeners, progress=progress
         )
     log = read_log(path)
-    report = write_page(log, path.with_suffix(".html"))
-    result = replace(result, notes=(*result.notes, *recording.notes))
+    report, notes = _report(log, path.with_suffix(".html"))
+    result = replace(result, notes=(*result.notes, *recording.notes, *notes))
     return FlownMission(result, figures_of(log), path, recording.statistics, report)
+
+
+def _report(log: FlightLog, path: Path) -> tuple[Path | None, tuple[str, ...]]:
+    """The review page; what hinders it is a note, since the flight is over and is judged by how it went."""
+    try:
+        return write_page(log, path), ()
+    except InputError as error:
+        return None, (f"no report: {error}",)
 
 
 def _header(

@@ -167,7 +167,8 @@ def _summarise(terminal: Terminal, flown: FlownMission) -> None:
             f"rehearsed / flown max error: {figures.predicted_max_error_m:.2f} / {figures.overall_max_error_m:.2f} m"
         )
     terminal.detail(f"log    {flown.log} ({flown.log.stat().st_size / 1e6:.1f} MB, opens in Foxglove)")
-    terminal.detail(f"report {flown.report}")
+    if flown.report is not None:
+        terminal.detail(f"report {flown.report}")
 
 
 def _facts(flown: FlownMission) -> dict[str, Any]:
@@ -186,5 +187,5 @@ def _facts(flown: FlownMission) -> dict[str, Any]:
         "saturation_share": figures.saturation_share,
         "predicted_max_error_m": figures.predicted_max_error_m,
         "log": str(flown.log),
-        "report": str(flown.report),
+        "report": None if flown.report is None else str(flown.report),
     }

@@ -9,7 +9,10 @@ from typing import Any
 
 import pytest
 
+from lcd_flight import api
 from lcd_flight.cli.main import app, flyer, run
+from lcd_flight.errors import InputError
+from lcd_flight.record import FlightLog
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 FOUR = MISSIONS / "four_waypoints.yaml"
@@ -179,3 +182,16 @@ def test_a_path_refused_says_that_the_learned_plan_was_not_used(said: Any, tmp_p
     assert code == 3
     assert "outside safety.geofence" in facts["error"]
     assert "the plan asked for was not used" in facts["error"]
+
+
+def test_a_report_that_cannot_be_written_leaves_a_landed_flight(
+    said: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_log: FlightLog, path: Path) -> Path:
+        raise InputError(f"{path}: cannot be written (no space left on device)")
+
+    monkeypatch.setattr(api, "write_page", full)
+    code, facts, story = said(flyer, str(FOUR), "--fast", "--log", str(tmp_path))
+    assert (code, facts["outcome"], facts["report"]) == (0, "landed", None)
+    assert "no report" in story
+    assert Path(facts["log"]).exists()

@@ -27,7 +27,7 @@ _tell: Callable[[str], None] | None = None
 """Who wants to know of compilations."""
 
 
-def announce_compilation(tell: Callable[[str], None]) -> None:
+def announce_compilation(tell: Callable[[str], None] | None) -> None:
     """Have `tell` called with a kernel's name whenever one is compiled rather than loaded: that takes seconds."""
     global _tell  # noqa: PLW0603 - numba's listeners are one for the process, too
     _tell = tell

@@ -38,9 +38,9 @@ def test_a_kept_plan_flies_as_a_fresh_one(kept: Path, tmp_path: Path) -> None:
     ]
     assert flown[0].figures.to_json() == flown[1].figures.to_json()
     header = read_log(flown[1].log).header
-    assert header.planner == "learned"
+    assert header.planner == "learned-polished"
     assert header.notes["plan"] == f"from {kept}"
-    assert [p.method for p in header.predictions] == ["learned"]
+    assert [p.method for p in header.predictions] == ["learned-polished"]
 
 
 def test_the_command(kept: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -48,7 +48,7 @@ def test_the_command(kept: Path, tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert run(flyer, [str(FOUR), *options]) == 0
     captured = capsys.readouterr()
     assert json.loads(captured.out.splitlines()[-1])["outcome"] == "landed"
-    assert f"PLAN       minimum snap -> learned, from {kept}" in captured.err
+    assert f"PLAN       minimum snap -> learned-polished, from {kept}" in captured.err
 
 
 def test_an_edited_mission_is_refused_before_anything_connects(

@@ -1,4 +1,4 @@
-"""From stored rows back to what was flown, and its features: the same arithmetic as when it was flown."""
+"""From stored rows back to what was flown: the same arithmetic as when it was flown."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from lcd_flight.learning.rollouts import Plans
 from lcd_flight.learning.sources import training_tasks, whitening
 from lcd_flight.learning.spread import cores
 from lcd_flight.model import FloatArray, Trajectories, World
-from lcd_flight.planning.cost.features import segment_features
 from lcd_flight.planning.knots import Whitening
 
 _ROWS_AT_A_TIME = 2048
@@ -28,15 +27,6 @@ def trajectories(world: World, seed: int, plans: Plans) -> Trajectories:
     """The plans as polynomials."""
     space = variables(world, seed, plans)
     return space.plan(plans.z.astype(np.float64).reshape(space.z_shape), plans.theta.astype(np.float64))
-
-
-def features(plans: Trajectories) -> FloatArray:
-    """(N, S, 114) features of each segment, on all cores."""
-
-    def part(rows: slice) -> FloatArray:
-        return segment_features(plans.durations_s[rows], plans.coefficients[rows])
-
-    return np.concatenate(in_slices(part, len(plans)))
 
 
 def in_slices(part: Callable[[slice], FloatArray], rows: int) -> list[FloatArray]:

@@ -122,7 +122,7 @@ def analytic(problem: Problem) -> Planned:
 
 
 def analytic_long(problem: Problem) -> Planned:
-    """The same with ten times the iterations: no less processor time than `learned` takes."""
+    """The same with 400 iterations: no less processor time than `learned` takes (measured: 1.1 times)."""
     return _solved(_solve(problem, ThrustProxy(), PlannerOptions(problem.timing, ANALYTIC_SNAP_WEIGHT, iterations=400)))
 
 

@@ -117,18 +117,18 @@ def _predictions(cost: TrackingCost, plan: Trajectory, baseline: Trajectory) -> 
     plans = Trajectories(
         np.stack([plan.durations_s, baseline.durations_s]), np.stack([plan.coefficients, baseline.coefficients])
     )
-    value, _, _ = cost.value_and_gradient(plans.durations_s, plans.coefficients)
-    errors: FloatArray = np.full(2, np.nan)
-    if isinstance(cost, ErrorPredictor):
-        errors = cost.predict_max_error_m(plans.durations_s, plans.coefficients)
+    errors_m: FloatArray = np.full(2, np.nan)
     segments: list[tuple[float, ...] | None] = [None, None]
-    if isinstance(cost, CostModel):
-        segments = [tuple(row) for row in cost.predict_segment_errors_m(plans.durations_s, plans.coefficients).tolist()]
+    if isinstance(cost, ErrorPredictor):
+        value, parts_m = cost.predict(plans.durations_s, plans.coefficients)
+        errors_m, segments = parts_m.max(axis=1), [tuple(row) for row in parts_m.tolist()]
+    else:
+        value, _, _ = cost.value_and_gradient(plans.durations_s, plans.coefficients)
     return Predictions(
         cost=_number(value[0]),
         minimum_snap_cost=_number(value[1]),
-        predicted_max_error_m=_number(errors[0]),
-        minimum_snap_predicted_max_error_m=_number(errors[1]),
+        predicted_max_error_m=_number(errors_m[0]),
+        minimum_snap_predicted_max_error_m=_number(errors_m[1]),
         segment_errors_m=segments[0],
         minimum_snap_segment_errors_m=segments[1],
     )

@@ -27,8 +27,8 @@ from lcd_flight.planning.minimum_snap import snap
 Timing: TypeAlias = Literal["fixed", "retimed"]
 """`fixed`: the durations as given. `retimed`: moved between segments at equal total time."""
 
-_BLOCK_SEGMENTS = 1024
-"""Segments that are planned at a time: batches for fast products, and a place to report and to stop."""
+_BLOCK_SEGMENTS = 192
+"""Segments that are planned at a time: what a walk holds of them stays in a core's cache."""
 
 
 class TrackingCost(Protocol):
@@ -45,12 +45,14 @@ class TrackingCost(Protocol):
 class ErrorPredictor(TrackingCost, Protocol):
     """A cost that can say how far the vehicle will stray, and where it should not be asked."""
 
-    def predict_max_error_m(self, durations_s: FloatArray, coefficients: FloatArray) -> FloatArray:
-        """(N,) largest position error of each plan."""
+    def predict(self, durations_s: FloatArray, coefficients: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The costs (N,), and the largest position error in each part of each plan in m (N, parts)."""
         ...
 
-    def in_range(self, durations_s: FloatArray, coefficients: FloatArray) -> BoolArray:
-        """(N,) whether the predictions are good for each plan."""
+    def judged(
+        self, durations_s: FloatArray, coefficients: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+        """As `value_and_gradient`, and whether the predictions are good for each plan (N,)."""
         ...
 
     def out_of_range(self, durations_s: FloatArray, coefficients: FloatArray) -> tuple[str | None, ...]:
@@ -69,8 +71,8 @@ class PlannerOptions:
     """mu; less than this, and long missions end in time allocations that the network is wrong about."""
     cost_weight: float = 1.0
     """What the tracking cost is multiplied by; a mission's `weight`."""
-    iterations: int = 40
-    step: float = 0.08
+    iterations: int = 30
+    step: float = 0.12
     """Adam's first step; it decays to zero along a cosine."""
     start: Literal["analytic", "minimum-snap"] = "analytic"
     """Where the solve begins; `analytic` is the same solve on the analytic cost, with as many iterations."""
@@ -178,8 +180,8 @@ def _solved(whitening: Whitening, cost: TrackingCost, options: PlannerOptions) -
     z, theta = objective.unpack(descent.best)
     found, minimum = whitening.plan(z, theta), whitening.minimum
     before, after = _Judgement.of(cost, minimum), _Judgement.of(cost, found)
-    strange = _strangeness(cost, whitening.plan(*objective.unpack(descent.last)))
     improved = after.below(before) & descent.trusted
+    strange = _strangeness(cost, whitening.plan(*objective.unpack(descent.last)), descent.mistrusted & ~improved)
     verdicts = zip(descent.failed, improved, descent.mistrusted, strange, strict=True)
     reasons = tuple(
         _why_not(segments=found.segments, failed=failed, improved=improved, mistrusted=mistrusted, strange=why)
@@ -233,7 +235,7 @@ class PlanObjective:
         """Values (N,), gradients (N, V), and which rows are in the cost's range (N,)."""
         z, theta = self.unpack(variables)
         plans = self._whitening.plan(z, theta)
-        cost, grad_durations, grad_coefficients = self._cost.value_and_gradient(plans.durations_s, plans.coefficients)
+        cost, grad_durations, grad_coefficients, trusted = self._judge(plans)
         grad_z, grad_theta = self._whitening.pullback(z, theta, grad_durations, grad_coefficients)
         weights = np.full(self.size, self._options.snap_weight)
         weights[self._z_size :] = self._options.time_weight
@@ -242,9 +244,14 @@ class PlanObjective:
         grad = self._options.cost_weight * grad + 2.0 * weights * variables
         if self._options.timing == "fixed":
             grad[:, self._z_size :] = 0.0
-        if self._predictor is None:
-            return value, grad, np.ones(len(plans), dtype=bool)
-        return value, grad, self._predictor.in_range(plans.durations_s, plans.coefficients)
+        return value, grad, trusted
+
+    def _judge(self, plans: Trajectories) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+        """What the cost says of plans; one that does not know its limits is trusted everywhere."""
+        if self._predictor is not None:
+            return self._predictor.judged(plans.durations_s, plans.coefficients)
+        answer = self._cost.value_and_gradient(plans.durations_s, plans.coefficients)
+        return *answer, np.ones(len(plans), dtype=bool)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -256,20 +263,26 @@ class _Judgement:
 
     @staticmethod
     def of(cost: TrackingCost, plans: Trajectories) -> _Judgement:
+        if isinstance(cost, ErrorPredictor):
+            value, errors_m = cost.predict(plans.durations_s, plans.coefficients)
+            return _Judgement(value, errors_m.max(axis=1))
         value, _, _ = cost.value_and_gradient(plans.durations_s, plans.coefficients)
-        if not isinstance(cost, ErrorPredictor):
-            return _Judgement(value, np.full(len(plans), np.nan))
-        return _Judgement(value, cost.predict_max_error_m(plans.durations_s, plans.coefficients))
+        return _Judgement(value, np.full(len(plans), np.nan))
 
     def below(self, other: _Judgement) -> BoolArray:
         """(N,) whether the cost is lower, and the predicted error too where there is one."""
         return (self.cost < other.cost) & ~(self.max_error_m >= other.max_error_m)
 
 
-def _strangeness(cost: TrackingCost, plans: Trajectories) -> tuple[str | None, ...]:
-    if isinstance(cost, ErrorPredictor):
-        return cost.out_of_range(plans.durations_s, plans.coefficients)
-    return (None,) * len(plans)
+def _strangeness(cost: TrackingCost, plans: Trajectories, asked: BoolArray) -> list[str | None]:
+    """For each plan that is asked about: why it is out of the cost's range."""
+    reasons: list[str | None] = [None] * len(plans)
+    rows = np.flatnonzero(asked)
+    if len(rows) and isinstance(cost, ErrorPredictor):
+        there = plans.take(rows)
+        for row, reason in zip(rows, cost.out_of_range(there.durations_s, there.coefficients), strict=True):
+            reasons[row] = reason
+    return reasons
 
 
 def _why_not(*, segments: int, failed: bool, improved: bool, mistrusted: bool, strange: str | None) -> str | None:

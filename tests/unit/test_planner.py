@@ -236,8 +236,9 @@ def test_where_nothing_is_better_minimum_snap_is_kept() -> None:
 
 def test_a_plan_whose_predicted_error_is_not_lower_is_not_taken() -> None:
     class Worse(cost_models.CostModel):
-        def predict_max_error_m(self, durations_s: FloatArray, coefficients: FloatArray) -> FloatArray:
-            return np.ones(len(durations_s))
+        def predict(self, durations_s: FloatArray, coefficients: FloatArray) -> tuple[FloatArray, FloatArray]:
+            value, errors_m = super().predict(durations_s, coefficients)
+            return value, np.ones_like(errors_m)
 
     worse = Worse(*(getattr(COST, f.name) for f in fields(COST)))
     assert plan(some_tasks(2), worse).fallback == ("no plan was predicted to be better than minimum snap",) * 2

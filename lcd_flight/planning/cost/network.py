@@ -147,9 +147,15 @@ def _kernel() -> Callable[[Array, Array, Array, Array], None]:
 def activate(x: Array, activation: Activation) -> tuple[Array, Array]:
     """The activation of `x` and its slope there."""
     if activation == "silu":
-        share = 0.5 + 0.5 * np.tanh(0.5 * x)  # the logistic function, without overflow
+        share = 0.5 * x  # then, in place: the logistic function, without overflow
+        np.tanh(share, out=share)
+        share *= 0.5
+        share += 0.5
         value = x * share
-        return value, share + value * (1.0 - share)
+        slope = 1.0 - share
+        slope *= value
+        slope += share
+        return value, slope
     if activation == "elu":
         decay = np.exp(np.minimum(x, 0.0))
         return np.maximum(x, 0.0) + (decay - 1.0), decay

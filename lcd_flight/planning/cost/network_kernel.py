@@ -24,7 +24,8 @@ def affine(x: Any, weights: Any, biases: Any, out: Any) -> None:
     tile = np.empty(4 * PANEL, x.dtype)
     for m in range(members):
         rows = x[m % x.shape[0]]
-        for first in range(0, outputs, PANEL):
+        for panel in range(0, outputs, PANEL):
+            first = max(0, min(panel, outputs - PANEL))  # the last overlaps: a narrow one would be computed one by one
             for b in range(0, rows.shape[0], 4):
                 _tile(rows, b, weights[m], biases[m], first, tile, out[m])
 

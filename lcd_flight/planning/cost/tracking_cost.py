@@ -18,7 +18,7 @@ import numpy as np
 
 from lcd_flight.model import BoolArray, FloatArray, InputError
 from lcd_flight.planning.cost.inputs import INPUTS, Inputs
-from lcd_flight.planning.cost.network import Array, Network
+from lcd_flight.planning.cost.network import Array, Network, Tape
 
 if TYPE_CHECKING:
     from lcd_flight.planning.cost.model_card import ModelCard
@@ -78,24 +78,36 @@ class CostModel:
             The costs (N,), their gradients by the durations (N, S) with the coefficients held, and by the
             coefficients (N, 4, S, 8). Not finite where the plan is not.
         """
+        value, grad_durations, grad_coefficients, _ = self.judged(durations_s, coefficients)
+        return value, grad_durations, grad_coefficients
+
+    def judged(
+        self, durations_s: FloatArray, coefficients: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+        """`value_and_gradient` and `in_range`, from the same features."""
         features = self._features(durations_s, coefficients)
         value, grad_features = np.empty(len(features)), np.empty(features.shape)
         for rows in self._row_blocks(len(features), features.shape[1]):
             value[rows], grad_features[rows] = self._of_features(features[rows])
-        return value, *self.inputs.pullback(durations_s, coefficients, grad_features)
+        return value, *self.inputs.pullback(durations_s, coefficients, grad_features), self._inside(features)
 
-    def predict_segment_errors_m(self, durations_s: FloatArray, coefficients: FloatArray) -> FloatArray:
-        """(N, S) the largest error in each segment in m, by the mean of the members' logarithms: no pessimism.
+    def predict(self, durations_s: FloatArray, coefficients: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What `value_and_gradient` gives as costs (N,), and the largest error in each segment in m (N, S).
 
-        (N, 1) that of the whole trajectory, where that is what the networks see.
+        The errors are by the mean of the members' logarithms: no pessimism. (N, 1) that of the whole trajectory, where
+        that is what the networks see.
         """
         features = self._features(durations_s, coefficients)
-        log_error = np.empty(features.shape[:2])
+        value, mean = np.empty(len(features)), np.empty(features.shape[:2])
         for rows in self._row_blocks(len(features), features.shape[1]):
-            inputs = self.inputs.arrange(self._normalised(features[rows]))
-            outputs, _ = self.network.forward(inputs.reshape(-1, inputs.shape[2]))
-            log_error[rows] = outputs.mean(axis=0, dtype=np.float64).reshape(inputs.shape[:2])
-        return np.asarray(np.exp(log_error))
+            log_errors, _ = self._log_errors(features[rows])
+            value[rows], _ = _aggregate(log_errors)
+            mean[rows] = log_errors.mean(axis=0)
+        return value, np.asarray(np.exp(mean))
+
+    def predict_segment_errors_m(self, durations_s: FloatArray, coefficients: FloatArray) -> FloatArray:
+        """(N, S) the second of `predict`."""
+        return self.predict(durations_s, coefficients)[1]
 
     def predict_max_error_m(self, durations_s: FloatArray, coefficients: FloatArray) -> FloatArray:
         """(N,) the largest error of each plan in m: that of its worst segment."""
@@ -103,7 +115,7 @@ class CostModel:
 
     def in_range(self, durations_s: FloatArray, coefficients: FloatArray) -> BoolArray:
         """(N,) whether all features of a plan are within what the networks were trained on."""
-        return np.asarray((self._beyond(self._features(durations_s, coefficients)) <= 0.0).all(axis=(1, 2)))
+        return self._inside(self._features(durations_s, coefficients))
 
     def out_of_range(self, durations_s: FloatArray, coefficients: FloatArray) -> tuple[str | None, ...]:
         """For each plan None, or which feature is farthest out."""
@@ -132,6 +144,12 @@ class CostModel:
         place = f" of segment {segment + 1}" if len(features) > 1 else ""
         return f"{names[column]}{place} is {value:.3g}, trained on {bounds}"
 
+    def _inside(self, features: FloatArray) -> BoolArray:
+        """(N,) whether features (N, R, F) are all within what is tolerated; what is not a number is not."""
+        slack = RANGE_TOLERANCE * (self.feature_high - self.feature_low)
+        inside = (features >= self.feature_low - slack) & (features <= self.feature_high + slack)
+        return np.asarray(inside.all(axis=(1, 2)))
+
     def _beyond(self, features: FloatArray) -> FloatArray:
         """How far features (..., F) are beyond what is tolerated, in spans of their range; above 0 is outside."""
         span = self.feature_high - self.feature_low
@@ -143,15 +161,21 @@ class CostModel:
             scaled = (features - self.feature_mean) / self.feature_spread
             return np.asarray(scaled.astype(self.network.dtype))
 
-    def _of_features(self, features: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The costs (N,) of features (N, S, F), and their gradient by these."""
+    def _log_errors(self, features: FloatArray) -> tuple[FloatArray, Tape]:
+        """What the members say of features (N, R, F), (M, N, R), and what the way back needs."""
         inputs = self.inputs.arrange(self._normalised(features))
         with np.errstate(over="ignore", invalid="ignore"):
             outputs, tape = self.network.forward(inputs.reshape(-1, inputs.shape[2]))
-            log_errors = outputs.astype(np.float64).reshape(-1, *inputs.shape[:2])
+        return outputs.astype(np.float64).reshape(-1, *inputs.shape[:2]), tape
+
+    def _of_features(self, features: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The costs (N,) of features (N, R, F), and their gradient by these."""
+        log_errors, tape = self._log_errors(features)
+        with np.errstate(over="ignore", invalid="ignore"):
             value, grad_log_errors = _aggregate(log_errors)
             grad_inputs = self.network.backward(tape, grad_log_errors.reshape(len(log_errors), -1))
-            return value, self.inputs.arrange_pullback(grad_inputs.reshape(inputs.shape)) / self.feature_spread
+            grad_arranged = grad_inputs.reshape(*features.shape[:2], -1)
+            return value, self.inputs.arrange_pullback(grad_arranged) / self.feature_spread
 
     @staticmethod
     def _row_blocks(tasks: int, rows: int) -> list[slice]:

@@ -38,8 +38,8 @@ def train(
     Run again after an interruption, it goes on where it stopped.
     """
     from lcd_flight import plugins
+    from lcd_flight.files import write_whole
     from lcd_flight.learning.card_figure import card_figure
-    from lcd_flight.learning.files import write_text
     from lcd_flight.learning.recipes import RECIPES
     from lcd_flight.learning.train import train as train_model
 
@@ -53,7 +53,7 @@ def train(
     folder = work or Path("data") / f"{out.stem}-{recipe}-{seed}"
     with following(terminal, "TRAIN") as progress:
         card = train_model(config, folder, out, plugins.simulator(), progress)
-    write_text(out.with_suffix(".svg"), card_figure(card))
+    write_whole(out.with_suffix(".svg"), card_figure(card))
     told = ", ".join(f"{key} {value:.3g}" for key, value in card.validation.items())
     terminal.line("TRAIN", f"{out}: {told}; {out.with_suffix('.svg').name} shows its card")
     return terminal.finish(Outcome.OK, {"model": str(out), "work": str(folder), "validation": card.validation})

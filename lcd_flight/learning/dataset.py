@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from lcd_flight.learning.files import write_durably
+from lcd_flight.files import write_durably
 from lcd_flight.learning.fingerprint import Description, differences, fingerprint, origin, versions
 from lcd_flight.learning.rollouts import Rollouts
 from lcd_flight.learning.shard_file import ShardHeader, encode, read_header, read_rows

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from lcd_flight.files import write_durably
 from lcd_flight.learning.dataset import Dataset
-from lcd_flight.learning.files import write_durably
 from lcd_flight.learning.manifest import NAME, Manifest
 from lcd_flight.learning.schema import COLUMNS, SCHEMA_VERSION
 

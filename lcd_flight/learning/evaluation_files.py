@@ -13,9 +13,9 @@ from zipfile import BadZipFile
 
 import numpy as np
 
+from lcd_flight.files import writing
 from lcd_flight.learning.evaluation import Evaluation, EvaluationOptions, MethodRun
 from lcd_flight.learning.extras import require_pyarrow
-from lcd_flight.learning.files import writing
 from lcd_flight.learning.fingerprint import described, fingerprint
 from lcd_flight.learning.freshness import hash_of_files, planner_sources
 from lcd_flight.model import InputError, Simulator, Tasks, World

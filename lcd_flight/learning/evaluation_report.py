@@ -9,10 +9,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from lcd_flight.files import write_whole
 from lcd_flight.learning.evaluation import Evaluation
 from lcd_flight.learning.evaluation_figures import crash_rate_figure, error_figure
 from lcd_flight.learning.evaluation_files import write_flights
-from lcd_flight.learning.files import write_text
 from lcd_flight.learning.fingerprint import versions
 
 Pairs = Sequence[tuple[str, str]]
@@ -33,13 +33,13 @@ def write_report(folder: Path, evaluations: Sequence[Evaluation], pairs: Pairs =
         InputError: pyarrow is not installed, or a file cannot be written.
     """
     result = report(evaluations, pairs) | {"versions": versions("numpy", "numba")}
-    write_text(folder / "evaluation.json", json.dumps(_finite(result), indent=1, allow_nan=False) + "\n")
+    write_whole(folder / "evaluation.json", json.dumps(_finite(result), indent=1, allow_nan=False) + "\n")
     write_flights(folder / "flights.parquet", list(evaluations))
     for evaluation in evaluations:
         options = evaluation.options
         title = f"{evaluation.world}, {options.timing}, drag {', '.join(map(str, options.drags))}"
-        write_text(folder / f"crash-rates-{evaluation.world}.svg", crash_rate_figure(title, evaluation))
-        write_text(folder / f"errors-{evaluation.world}.svg", error_figure(title, evaluation))
+        write_whole(folder / f"crash-rates-{evaluation.world}.svg", crash_rate_figure(title, evaluation))
+        write_whole(folder / f"errors-{evaluation.world}.svg", error_figure(title, evaluation))
 
 
 def _of_one(evaluation: Evaluation, pairs: Pairs) -> dict[str, Any]:

@@ -14,8 +14,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from lcd_flight.files import write_durably
 from lcd_flight.learning.dataset import Dataset
-from lcd_flight.learning.files import write_durably
 from lcd_flight.learning.fingerprint import Description
 from lcd_flight.learning.schema import SCHEMA_VERSION
 from lcd_flight.learning.shard_file import ShardHeader

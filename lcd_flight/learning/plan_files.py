@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from lcd_flight.learning.files import writing
+from lcd_flight.files import writing
 from lcd_flight.learning.npz import read_array, read_arrays
 from lcd_flight.model import COEFFICIENTS, BoolArray, InputError, Trajectories
 

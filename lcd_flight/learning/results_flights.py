@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lcd_flight.files import write_whole
 from lcd_flight.learning.evaluate import tasks_of
-from lcd_flight.learning.files import write_text
 from lcd_flight.learning.flight_figures import Flight, PathTeller, flight_figure, fly_again, gallery_figure
 from lcd_flight.learning.reproduce import Reproduction
 from lcd_flight.model import Simulator
@@ -39,11 +39,11 @@ def write_flights(result: Reproduction, folder: Path, simulator: Simulator, tell
         words = f"{name}: task {row}, largest error {minimum.max_error_m[row, 0, 0]:.2f} m"
         flights.append(replace(flown(row, "minimum-snap"), name=words))
     title = "Minimum snap: flights at the 5th, 50th and 95th percentile of the largest error"
-    write_text(folder / "low-medium-high.svg", gallery_figure(title, flights))
+    write_whole(folder / "low-medium-high.svg", gallery_figure(title, flights))
     shown = ["![Minimum-snap flights of low, medium and high cost](low-medium-high.svg)"]
     saved = np.flatnonzero(minimum.crashed[:, 0, 0] & ~learned.crashed[:, 0, 0])
     if len(saved):
         title = f"Task {saved[0]}, the first that minimum snap crashes on and the learned plan does not"
-        write_text(folder / "flight.svg", flight_figure(title, [flown(int(saved[0]), name) for name in _PICTURED]))
+        write_whole(folder / "flight.svg", flight_figure(title, [flown(int(saved[0]), name) for name in _PICTURED]))
         shown.append("![One task, planned and flown by minimum snap and by the learned planner](flight.svg)")
     return shown

@@ -16,9 +16,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from lcd_flight.files import write_whole
 from lcd_flight.learning import results_tables as tables
 from lcd_flight.learning.evaluation_figures import bar_figure, crash_rate_figure, error_figure
-from lcd_flight.learning.files import write_text
 from lcd_flight.learning.fingerprint import versions
 from lcd_flight.learning.flight_figures import PathTeller
 from lcd_flight.learning.freshness import about_seed
@@ -43,14 +43,14 @@ def write_results(result: Reproduction, folder: Path, simulator: Simulator) -> P
     for experiment in result.in_group("paper"):
         evaluation = result.evaluations[experiment.name]
         title = f"{experiment.world.name}, {tables.TIMING_WORDS[experiment.options.timing]}"
-        write_text(folder / f"crash-rates-{experiment.name}.svg", crash_rate_figure(title, evaluation))
-        write_text(folder / f"errors-{experiment.name}.svg", error_figure(title, evaluation))
+        write_whole(folder / f"crash-rates-{experiment.name}.svg", crash_rate_figure(title, evaluation))
+        write_whole(folder / f"errors-{experiment.name}.svg", error_figure(title, evaluation))
     for timing, rows in tables.lesson_rows(result).items():
         title = f"{LESSON_WORLD}, {tables.TIMING_WORDS[timing]}: what a model was made from"
-        write_text(folder / f"lesson-{timing}.svg", bar_figure(title, rows))
+        write_whole(folder / f"lesson-{timing}.svg", bar_figure(title, rows))
     flights = write_flights(result, folder, simulator, simulator) if isinstance(simulator, PathTeller) else []
-    write_text(folder / "results.json", json.dumps(_rounded(_as_json(result)), separators=(",", ":")) + "\n")
-    write_text(folder / "README.md", page(result, flights))
+    write_whole(folder / "results.json", json.dumps(_rounded(_as_json(result)), separators=(",", ":")) + "\n")
+    write_whole(folder / "README.md", page(result, flights))
     return folder / "README.md"
 
 

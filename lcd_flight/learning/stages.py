@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
-from lcd_flight.learning.files import write_text
+from lcd_flight.files import write_whole
 from lcd_flight.learning.progress import Progress
 from lcd_flight.model import InputError
 
@@ -81,7 +81,7 @@ class Stages:
         finally:
             took_s = time.monotonic() - began_s
             self._seconds[stage.key] = self._seconds.get(stage.key, 0.0) + took_s
-            write_text(self._book, json.dumps(self._seconds, indent=1) + "\n")
+            write_whole(self._book, json.dumps(self._seconds, indent=1) + "\n")
         if took_s > _FOUND_SHARE * stage.expected_s:
             self._took_s, self._counted_s = self._took_s + took_s, self._counted_s + stage.expected_s
 

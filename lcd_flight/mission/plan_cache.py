@@ -12,11 +12,11 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from lcd_flight.files import write_whole
 from lcd_flight.jit import cache_folder
 from lcd_flight.mission.assemble import TrajectoryTask
 from lcd_flight.mission.plan_record import PlanRecord, first_error
 from lcd_flight.mission.solution import Solution
-from lcd_flight.mission.whole_file import write_whole
 from lcd_flight.model import InputError
 
 MOST_PLANS = 256

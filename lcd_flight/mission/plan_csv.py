@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
+from lcd_flight.files import write_whole
 from lcd_flight.mission.assemble import TrajectoryTask, trajectory_tasks
 from lcd_flight.mission.mission import Mission
 from lcd_flight.mission.planned import PlannedMission, planned_mission
 from lcd_flight.mission.solution import Solution
 from lcd_flight.mission.soundness import discontinuity, knot_derivatives
 from lcd_flight.mission.source_file import read_text
-from lcd_flight.mission.whole_file import write_whole
 from lcd_flight.model import FloatArray, InputError, Trajectory, Vehicle
 from lcd_flight.planning.segments import polynomials
 from lcd_flight.planning.times import SAME_POINT

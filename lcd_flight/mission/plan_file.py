@@ -14,13 +14,13 @@ from typing import Annotated, Any, Literal
 import pydantic_core
 from pydantic import Field, ValidationError
 
+from lcd_flight.files import write_whole
 from lcd_flight.mission.assemble import trajectory_tasks
 from lcd_flight.mission.mission import Mission
 from lcd_flight.mission.plan_record import PlanRecord, Record, first_error
 from lcd_flight.mission.planned import PlannedMission, planned_mission
 from lcd_flight.mission.solution import Solution
 from lcd_flight.mission.source_file import read_text
-from lcd_flight.mission.whole_file import write_whole
 from lcd_flight.model import InputError, Loop, Vehicle
 from lcd_flight.worlds import fingerprint
 

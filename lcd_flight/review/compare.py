@@ -9,7 +9,7 @@ import numpy as np
 
 from lcd_flight.drawing.html import Html, tag
 from lcd_flight.drawing.scale import Axis, axis_around
-from lcd_flight.mission.whole_file import write_whole
+from lcd_flight.files import write_whole
 from lcd_flight.model.types import FloatArray
 from lcd_flight.record import FlightLog
 from lcd_flight.review import sections

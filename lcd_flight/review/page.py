@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from lcd_flight.drawing.html import Html, tag
-from lcd_flight.mission.whole_file import write_whole
+from lcd_flight.files import write_whole
 from lcd_flight.record import FlightLog
 from lcd_flight.review import sections
 from lcd_flight.review.chart import panel_html

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from lcd_flight.drawing import colors
 from lcd_flight.drawing.html import Html, tag
-from lcd_flight.mission.whole_file import write_whole
+from lcd_flight.files import write_whole
 from lcd_flight.record import FlightLog
 from lcd_flight.review.assets import asset
 from lcd_flight.review.figures import figures_of

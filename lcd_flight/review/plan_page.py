@@ -8,10 +8,10 @@ from pathlib import Path
 
 from lcd_flight.drawing import colors
 from lcd_flight.drawing.html import Html, joined, tag
+from lcd_flight.files import write_whole
 from lcd_flight.mission import Mission
 from lcd_flight.mission.planned import PlannedMission
 from lcd_flight.mission.solution import MINIMUM_SNAP
-from lcd_flight.mission.whole_file import write_whole
 from lcd_flight.model import LegKind, Vehicle
 from lcd_flight.planning.limits import Peaks
 from lcd_flight.review.assets import asset

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from lcd_flight.mission.whole_file import write_whole
+from lcd_flight.files import write_whole
 from lcd_flight.model import RefusedError
 from lcd_flight.model.types import FloatArray
 from lcd_flight.record import FlightLog

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lcd_flight.mission.whole_file import write_whole
+from lcd_flight.files import write_whole
 from lcd_flight.model import RefusedError
 from lcd_flight.record import FlightLog, Series
 

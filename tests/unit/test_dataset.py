@@ -8,7 +8,8 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 
-from lcd_flight.learning import files, shard_file
+from lcd_flight import files
+from lcd_flight.learning import shard_file
 from lcd_flight.learning.dataset import Dataset, open_dataset
 from lcd_flight.learning.rollouts import Plans, Rollouts, Source
 from lcd_flight.learning.schema import COLUMNS

@@ -121,7 +121,7 @@ def test_a_viewer_sees_the_flight(client: tuple[FoxgloveServer, Client]) -> None
     viewer.subscribe()
     assert {t: c["schemaName"] for t, c in viewer.channels.items()} == {t.name: t.schema_name for t in TOPICS}
     assert {t: c["encoding"] for t, c in viewer.channels.items()} == {t.name: t.encoding for t in TOPICS}
-    time.sleep(0.2)  # until the server has taken the subscription
+    wait_for_subscriptions(server)
     for data in published():
         server.take(decode(data))
     seen: dict[str, int] = {}

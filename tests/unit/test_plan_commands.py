@@ -137,8 +137,8 @@ NEVER = ("--world", "crazyflie-paper", "--out", "never.npz")
         ),
         (["--tasks", "tasks.npz", "--world", "crazyflie-paper", "--out", "."], ".: plans go to a file whose name ends"),
         (["demo", "--out", "."], ".: is a folder; name a file in it"),
-        (["demo", "--html", "no/p.html"], "no/p.html: cannot be written (No such file or directory)"),
-        (["demo", "--csv", "no/p.csv"], "no/p.csv: cannot be written (No such file or directory)"),
+        (["demo", "--html", "tasks.npz/p.html"], "tasks.npz/p.html: cannot be written (File exists)"),
+        (["demo", "--csv", "tasks.npz/p.csv"], "tasks.npz/p.csv: cannot be written (File exists)"),
     ],
 )
 def test_wrong_input_is_one_line(capsys: pytest.CaptureFixture[str], arguments: list[str], message: str) -> None:

@@ -207,8 +207,9 @@ def test_a_full_disk_leaves_the_file_that_was_there(tmp_path: Path, monkeypatch:
 def test_places_that_cannot_be_read_or_written(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.json: no such file"):
         planned_from_file(tmp_path / "none.json", mission(), VEHICLE)
-    with pytest.raises(InputError, match=r"plan\.json: cannot be written \(No such file or directory\)"):
-        write_plan(tmp_path / "no" / "plan.json", planned(), mission(), VEHICLE)
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match=r"plan\.json: cannot be written \(File exists\)"):
+        write_plan(tmp_path / "file" / "plan.json", planned(), mission(), VEHICLE)
     with pytest.raises(InputError, match="is a folder; name a file in it"):
         write_plan(tmp_path, planned(), mission(), VEHICLE)
-    assert [path.name for path in tmp_path.iterdir()] == []
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]

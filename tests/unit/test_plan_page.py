@@ -126,6 +126,7 @@ def test_names_are_escaped() -> None:
 
 
 def test_a_place_that_cannot_be_written_to(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
     with pytest.raises(InputError, match="cannot be written"):
-        write_plan_page(mission(), VEHICLE, planned(), tmp_path / "no" / "plan.html")
+        write_plan_page(mission(), VEHICLE, planned(), tmp_path / "file" / "plan.html")
     assert write_plan_page(mission(), VEHICLE, planned(), tmp_path / "plan.html").stat().st_size > 10_000

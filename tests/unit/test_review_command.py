@@ -83,7 +83,7 @@ def test_series_and_pictures_where_asked_for(
         (["{folder}/c.mcap"], ["no such file", "the newest log in {folder} is {folder}/b.mcap"]),
         (["{folder}"], ["is a folder", "the newest log in {folder} is {folder}/b.mcap"]),
         (["{a}", "{b}", "--csv", "x.csv"], ["--csv x.csv", "one file, 2 logs", "one by one"]),
-        (["{a}", "--csv", "{folder}/no/x.csv"], ["{folder}/no/x.csv", "cannot be written", "choose another place"]),
+        (["{a}", "--csv", "{a}/x.csv"], ["{a}/x.csv", "cannot be written", "choose another place"]),
         (["{a}", "--out", "{folder}"], ["{folder}", "is a folder", "name a file in it"]),
         ([], ["LOG"]),
     ],

@@ -100,5 +100,6 @@ def test_what_is_not_installed_is_named(
 @pytest.mark.parametrize("write", [write_csv, write_parquet, write_rerun])
 def test_a_place_that_cannot_be_written_is_named(log: FlightLog, tmp_path: Path, write: object) -> None:
     pytest.importorskip("rerun")
+    (tmp_path / "no").touch()
     with pytest.raises(InputError, match=r"such/folder: cannot be written .* choose another place"):
         write(log, tmp_path / "no" / "such" / "folder")  # type: ignore[operator]

@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all."""
+"""Files that are written whole or not at all: nobody ever reads half of one, whatever interrupts the writing."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from lcd_flight.model import InputError
+from lcd_flight.errors import InputError
 
 
 @contextmanager
@@ -17,26 +17,28 @@ def writing(path: Path) -> Iterator[Path]:
     Raises:
         InputError: it cannot be written.
     """
-    partial = path.with_name(f".{path.name}.partial")
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; name a file in it")
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")  # two writers do not meet in one
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield partial
         partial.replace(path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error}); give another place or make room") from error
+        raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another place") from error
     finally:
         with suppress(OSError):
             partial.unlink()
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a text in UTF-8.
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Write a text (as UTF-8) or bytes.
 
     Raises:
         InputError: it cannot be written.
     """
     with writing(path) as partial:
-        partial.write_text(text, encoding="utf-8")
+        partial.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
 def write_durably(path: Path, content: bytes | memoryview) -> None:

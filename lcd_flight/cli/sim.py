@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from lcd_flight.cli import sim_crazyflie
+from lcd_flight.cli import sim_crazyflie, sim_mavlink
 
 app = typer.Typer(
     add_completion=False,
@@ -13,6 +13,7 @@ app = typer.Typer(
     help="Serve a simulated vehicle that behaves like the real one: a full bench without hardware.",
 )
 app.command("crazyflie")(sim_crazyflie.crazyflie)
+app.command("mavlink")(sim_mavlink.mavlink)
 
 
 @app.callback()

@@ -1,0 +1,73 @@
+"""`lcd sim mavlink`: a PX4 or ArduPilot vehicle for any program that speaks MAVLink (mavsdk, pymavlink, our own link)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from lcd_flight.cli.options import Json, NoColor, Quiet
+from lcd_flight.cli.terminal import Terminal
+from lcd_flight.errors import Outcome
+
+if TYPE_CHECKING:
+    from lcd_flight.cli.sim_server import Bench
+
+VEHICLE = "hummingbird"
+
+
+def mavlink(
+    mission: Annotated[
+        str | None, typer.Argument(metavar="[MISSION]", help="Take vehicle, place and motion capture from it.")
+    ] = None,
+    flavour: Annotated[str, typer.Option(help="px4 or ardupilot.")] = "px4",
+    port: Annotated[int, typer.Option(help="UDP port that clients listen on.", min=0, max=65535)] = 14540,
+    host: Annotated[str, typer.Option(help="Where they are.")] = "127.0.0.1",
+    tcp: Annotated[bool, typer.Option(help="Listen on TCP instead, as ArduPilot's simulation on 5760.")] = False,
+    vehicle: Annotated[str | None, typer.Option(help="Airframe: one that ships or a file.")] = None,
+    mocap: Annotated[str | None, typer.Option(help="Where its pose is published; `none` for nowhere.")] = None,
+    rigid_body: Annotated[str | None, typer.Option(help="Under which name.")] = None,
+    twist: Annotated[bool, typer.Option(help="Publish velocities beside the pose.")] = False,
+    own_mocap: Annotated[bool, typer.Option(help="Its estimator is fed by itself, without ODOMETRY.")] = False,
+    boot: Annotated[float | None, typer.Option(help="s until it can be armed; 2, ArduPilot 20.", min=0.0)] = None,
+    defaults: Annotated[str, typer.Option(help="Parameters: ready for external poses, or factory.")] = "ready",
+    key_file: Annotated[str | None, typer.Option(help="Signing key; or LCD_MAVLINK_KEY.")] = None,
+    fault: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=VALUE", help="A fault; may be given again (docs).")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of noise and faults.")] = 0,
+    seconds: Annotated[float | None, typer.Option(help="End by itself after so long.", min=0.0)] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+    no_color: NoColor = False,
+) -> int:
+    """Serve a simulated PX4 or ArduPilot vehicle and publish its pose as motion capture would; Ctrl-C ends it."""
+    from lcd_flight.cli.sim_server import bench_of, serve
+
+    terminal = Terminal(json_line=json, quiet=quiet, color=not no_color)
+    bench: Bench = bench_of(mission, vehicle or (None if mission else VEHICLE), mocap, rigid_body, seed)
+    options = {
+        "flavour": flavour,
+        "twist": twist,
+        "own_mocap": own_mocap,
+        "boot_s": boot,
+        "defaults": defaults,
+        "key_file": key_file,
+    }
+    address = f"{'tcp:' if tcp else ''}{host}:{port}"
+    told = serve("mavlink", address, {**_as_text(options), **_faults(fault or [])}, bench, terminal, seconds)
+    return terminal.finish(Outcome.OK, told)
+
+
+def _faults(given: list[str]) -> dict[str, str]:
+    """`NAME=VALUE` by name; what has no value is refused as an unknown option further on."""
+    return {name: value for name, _, value in (fault.partition("=") for fault in given)}
+
+
+def _as_text(options: dict[str, Any]) -> dict[str, str]:
+    """Options as they stand in a URI; what was not given is left out."""
+    return {
+        name: str(value).lower() if isinstance(value, bool) else str(value)
+        for name, value in options.items()
+        if value is not None
+    }

@@ -1,0 +1,216 @@
+"""One boot of the autopilot: what it hears is done, what it says is due. Packets stay outside."""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+from collections.abc import Callable
+from typing import Any
+
+from pymavlink.dialects.v20 import common
+
+from sim_bridge.mavlink import telemetry
+from sim_bridge.mavlink.ardupilot import ArduPilot
+from sim_bridge.mavlink.autopilot import INFO, Autopilot, Result
+from sim_bridge.mavlink.codec import Heard
+from sim_bridge.mavlink.commands import acknowledgement, execute
+from sim_bridge.mavlink.parameters import Parameters
+from sim_bridge.mavlink.px4 import Px4
+
+COMPONENT = common.MAV_COMP_ID_AUTOPILOT1
+EVERYBODY = 0
+MOST_WAITING = 500
+"""Answers that are not sent yet; more are lost."""
+LISTED_EACH = 2
+"""Parameters of a list that are sent in a period."""
+READ_NS, WRITE_NS, REBOOT_NS = 100_000_000, 20_000_000, 100_000_000
+"""How long ArduPilot takes to answer; until a reboot begins."""
+LONGEST_TEXT = 50
+
+
+class Firmware:
+    """One boot: an autopilot, its streams and its services."""
+
+    def __init__(self, pilot: Autopilot, parameters: Parameters, system: int, unix_ns: Callable[[int], int]) -> None:
+        self.pilot = pilot
+        self._parameters = parameters
+        self._system = system
+        self._unix_ns = unix_ns
+        px4 = isinstance(pilot, Px4)
+        self._builders = dict(telemetry.PX4_BUILDERS if px4 else telemetry.ARDUPILOT_BUILDERS)
+        self._builders[common.MAVLINK_MSG_ID_SYSTEM_TIME] = self._system_time
+        self._rates = telemetry.PX4_RATES if px4 else telemetry.ARDUPILOT_RATES
+        self._intervals = {kind: round(1e9 / rate) for kind, rate in self._rates.items()}
+        self._due = dict.fromkeys(self._intervals, pilot.now_ns)
+        self._later: list[tuple[int, int, Any]] = []
+        self._numbers = itertools.count()
+        self._texts = itertools.count(1)
+        self._listed: int | None = None
+        self.reboot_ns: int | None = None
+        """When it is going to reboot."""
+        self.key: bytes | None = None
+        """A key that came in SETUP_SIGNING; all zeros remove the one there is."""
+        self.rejected: frozenset[int] = frozenset()
+        """Commands that are denied, whatever they ask for: a fault."""
+        self._acts: dict[int, Callable[[Heard], None]] = {
+            common.MAVLINK_MSG_ID_COMMAND_LONG: self._command_long,
+            common.MAVLINK_MSG_ID_COMMAND_INT: self._command_int,
+            common.MAVLINK_MSG_ID_SET_MODE: self._set_mode,
+            common.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: self._list,
+            common.MAVLINK_MSG_ID_PARAM_REQUEST_READ: self._read,
+            common.MAVLINK_MSG_ID_PARAM_SET: self._write,
+            common.MAVLINK_MSG_ID_TIMESYNC: self._timesync,
+            common.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: lambda heard: self.pilot.take_attitude(heard.message),
+            common.MAVLINK_MSG_ID_ODOMETRY: lambda heard: self.pilot.take_odometry(heard.message),
+            common.MAVLINK_MSG_ID_VISION_POSITION_ESTIMATE: lambda heard: self.pilot.take_vision(heard.message),
+            common.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN: self._set_origin,
+            common.MAVLINK_MSG_ID_SETUP_SIGNING: self._setup_signing,
+        }
+
+    def take(self, heard: Heard) -> None:
+        """A message for this vehicle, or for all of them."""
+        message = heard.message
+        system = getattr(message, "target_system", EVERYBODY)
+        component = getattr(message, "target_component", EVERYBODY)
+        act = self._acts.get(heard.kind)
+        if act is not None and system in (EVERYBODY, self._system) and component in (EVERYBODY, COMPONENT):
+            act(heard)
+
+    def step(self, now_ns: int) -> list[Any]:
+        """Live one period; the messages that go out."""
+        self.pilot.step(now_ns)
+        due = [kind for kind, due_ns in self._due.items() if due_ns <= now_ns]
+        for kind in due:
+            self._due[kind] += self._intervals[kind] * (1 + (now_ns - self._due[kind]) // self._intervals[kind])
+        messages = [self._builders[kind](self.pilot) for kind in due]
+        return [*(message for message in messages if message is not None), *self._texted(), *self._waiting(now_ns)]
+
+    def set_interval(self, kind: int, interval_us: float) -> bool:
+        """0: as after a boot; negative: never."""
+        if kind not in self._builders:
+            return False
+        self._due.pop(kind, None)
+        if interval_us == 0.0 and kind in self._rates:
+            interval_us = 1e6 / self._rates[kind]
+        if interval_us > 0.0:
+            self._intervals[kind] = max(1_000_000, round(min(interval_us, 1e12) * 1e3))
+            self._due[kind] = self.pilot.now_ns
+        return True
+
+    def send_once(self, kind: int) -> bool:
+        """A message that has nothing to say is not sent; it is there all the same."""
+        builder = self._builders.get(kind)
+        if builder is None:
+            return False
+        message = builder(self.pilot)
+        if message is not None:
+            self._answer(message)
+        return True
+
+    def send_interval(self, kind: int) -> bool:
+        """MESSAGE_INTERVAL; -1: not sent."""
+        if kind not in self._builders:
+            return False
+        interval_us = self._intervals[kind] // 1000 if kind in self._due else -1
+        self._answer(common.MAVLink_message_interval_message(kind, interval_us))
+        return True
+
+    def reboot_soon(self) -> None:
+        """Once the acknowledgement is out."""
+        self.reboot_ns = self.pilot.now_ns + REBOOT_NS
+
+    def _answer(self, message: Any, after_ns: int = 0) -> None:
+        if len(self._later) < MOST_WAITING:
+            heapq.heappush(self._later, (self.pilot.now_ns + after_ns, next(self._numbers), message))
+
+    def answers(self) -> list[Any]:
+        """What is to be sent at once."""
+        return self._waiting(self.pilot.now_ns)
+
+    def _waiting(self, now_ns: int) -> list[Any]:
+        ready = []
+        while self._later and self._later[0][0] <= now_ns:
+            ready.append(heapq.heappop(self._later)[2])
+        for _ in range(LISTED_EACH if self._listed is not None else 0):
+            if self._listed is not None:
+                ready.append(self._parameters.message(self._listed))
+                self._listed = self._listed + 1 if self._listed + 1 < len(self._parameters) else None
+        return ready
+
+    def _texted(self) -> list[Any]:
+        """Texts that wait; long ones in pieces of 50 bytes with a number of their own."""
+        said, self.pilot.said = self.pilot.said, []
+        messages = []
+        for severity, text in said:
+            data = text.encode()
+            number = next(self._texts) % 2**16 if len(data) > LONGEST_TEXT else 0
+            for piece, start in enumerate(range(0, max(1, len(data)), LONGEST_TEXT)):
+                part = data[start : start + LONGEST_TEXT]
+                messages.append(common.MAVLink_statustext_message(severity, part, number, piece))
+        return messages
+
+    def _command_long(self, heard: Heard) -> None:
+        m = heard.message
+        self._command(heard, (m.param1, m.param2, m.param3, m.param4, m.param5, m.param6, m.param7))
+
+    def _command_int(self, heard: Heard) -> None:
+        m = heard.message
+        self._command(heard, (m.param1, m.param2, m.param3, m.param4, float(m.x), float(m.y), m.z))
+
+    def _command(self, heard: Heard, params: tuple[float, ...]) -> None:
+        command = heard.message.command
+        result = Result.DENIED if command in self.rejected else execute(command, params, self)
+        self._answer(acknowledgement(command, result, heard.system, heard.component))
+
+    def _set_mode(self, heard: Heard) -> None:
+        """The older way; not acknowledged by PX4, by ArduPilot with a COMMAND_ACK of message 11."""
+        result = Result.DENIED
+        if heard.message.base_mode & telemetry.CUSTOM:
+            result = self.pilot.request_mode(heard.message.custom_mode)
+        if isinstance(self.pilot, ArduPilot):
+            kind = common.MAVLINK_MSG_ID_SET_MODE
+            self._answer(acknowledgement(kind, result, heard.system, heard.component))
+
+    def _list(self, _: Heard) -> None:
+        self._listed = 0
+
+    def _read(self, heard: Heard) -> None:
+        """An unknown one is answered by PX4 with a text, by ArduPilot with nothing."""
+        name, index = heard.message.param_id, heard.message.param_index
+        found = self._parameters.find(name, index)
+        if found is not None:
+            self._answer(self._parameters.message(found), READ_NS if isinstance(self.pilot, ArduPilot) else 0)
+        elif isinstance(self.pilot, Px4):
+            self.pilot.say(INFO, f"[pm] unknown param ID: {_plain(name)}")
+
+    def _write(self, heard: Heard) -> None:
+        message = heard.message
+        found = self._parameters.find(message.param_id, -1)
+        if found is None:
+            if isinstance(self.pilot, Px4):
+                self.pilot.say(INFO, f"[pm] unknown param: {_plain(message.param_id)}")
+            return
+        if self._parameters.write(message.param_id, message.param_value, message.param_type):
+            told = self._parameters.echo(found, message.param_value)
+            self._answer(told, WRITE_NS if isinstance(self.pilot, ArduPilot) else 0)
+
+    def _timesync(self, heard: Heard) -> None:
+        if heard.message.tc1 == 0:
+            now_ns = self.pilot.now_ns - self.pilot.boot_ns
+            self._answer(common.MAVLink_timesync_message(now_ns, heard.message.ts1))
+
+    def _set_origin(self, heard: Heard) -> None:
+        m = heard.message
+        if isinstance(self.pilot, ArduPilot) and self.pilot.set_origin(m.latitude, m.longitude, m.altitude):
+            self.send_once(common.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
+
+    def _setup_signing(self, heard: Heard) -> None:
+        self.key = bytes(heard.message.secret_key)
+
+    def _system_time(self, pilot: Autopilot) -> Any:
+        return common.MAVLink_system_time_message(self._unix_ns(pilot.now_ns) // 1000, telemetry.boot_ms(pilot))
+
+
+def _plain(name: str) -> str:
+    """What can be shown of a name that somebody sent."""
+    return "".join(letter if letter.isalnum() or letter == "_" else "?" for letter in name[:16])

@@ -1,0 +1,119 @@
+"""Into the autopilot's mode, armed, and out again: a command, its acknowledgement, and what the heartbeat then says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from drivers.mavlink.autopilot import Autopilot
+from drivers.mavlink.commands import ACCEPTED, Commands, result_name
+from drivers.mavlink.dialect import mavlink
+from drivers.mavlink.picture import Picture
+from drivers.mavlink.waiting import pause, until
+from lcd_flight.model import Clock, RefusedError
+
+CONFIRM_S = 1.5
+"""For the heartbeat that shows it: one a second at the least."""
+MODE_LIMIT_S = 4.0
+ARM_LIMIT_S = 4.0
+"""Arming that is refused is asked for again each second; within the flight's own limit of 10 s."""
+RETRY_S = 1.0
+LAND_LIMIT_S = 8.0
+"""A vehicle on the ground disarms by itself 2 to 4 s after it was told to land."""
+FORCED = 21196.0
+_ARM, _SET_MODE = mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavlink.MAV_CMD_DO_SET_MODE
+
+
+@dataclass(frozen=True, slots=True)
+class Controls:
+    """What changing its state takes."""
+
+    autopilot: Autopilot
+    commands: Commands
+    picture: Picture
+    clock: Clock
+
+    def reason(self, result: int) -> str:
+        """Why it did not do as it was told: the result's name, and its latest complaints in its own words."""
+        said = self.picture.texts.recent(self.clock.now_ns())
+        return f"{result_name(result)}; the autopilot says {said}" if said else result_name(result)
+
+
+async def enter_mode(controls: Controls, mode: int) -> None:
+    """Change the mode, and see it changed.
+
+    Raises:
+        RefusedError: it will not, with its reason.
+    """
+    picture, clock, name = controls.picture, controls.clock, controls.autopilot.mode_name(mode)
+    deadline_ns, result = clock.now_ns() + round(MODE_LIMIT_S * 1e9), ACCEPTED
+    while clock.now_ns() < deadline_ns:
+        result = await controls.commands.ask(_SET_MODE, *controls.autopilot.mode_command(mode))
+        if result == ACCEPTED and await until(clock, lambda: picture.custom_mode == mode, CONFIRM_S):
+            return
+        if picture.custom_mode == mode:  # the acknowledgement was lost, the change was not
+            return
+        if result != ACCEPTED:
+            await pause(clock, RETRY_S)
+    if result == ACCEPTED:
+        now = "none" if picture.custom_mode is None else controls.autopilot.mode_name(picture.custom_mode)
+        raise RefusedError(f"the autopilot took the change to {name} but stays in {now}: is a remote control on?")
+    raise RefusedError(f"the autopilot refuses {name}: {controls.reason(result)}")
+
+
+async def arm(controls: Controls) -> None:
+    """Arm, and see it armed; what it refuses is asked for again each second, since sensors may still settle.
+
+    Raises:
+        RefusedError: it will not, with its reason.
+    """
+    picture, clock = controls.picture, controls.clock
+    deadline_ns, result = clock.now_ns() + round(ARM_LIMIT_S * 1e9), ACCEPTED
+    while clock.now_ns() < deadline_ns:
+        result = await controls.commands.ask(_ARM, 1.0)
+        if (result == ACCEPTED or picture.armed) and await until(clock, lambda: picture.armed is True, CONFIRM_S):
+            return
+        if result != ACCEPTED:
+            await pause(clock, RETRY_S)
+    if result == ACCEPTED:
+        raise RefusedError("the autopilot took the order to arm but stays disarmed: look at its messages")
+    raise RefusedError(f"the autopilot will not arm: {controls.reason(result)}")
+
+
+async def disarm(controls: Controls, *, flown: bool) -> None:
+    """Disarm on the ground: after a flight by its own LAND mode, else by order; by force where neither helps.
+
+    ArduPilot does not reliably see a touchdown on no thrust, and then refuses an ordinary disarm for seconds.
+
+    Raises:
+        RefusedError: it stays armed.
+    """
+    picture, clock = controls.picture, controls.clock
+    if flown and await _lands(controls):
+        return
+    for forced in (0.0, FORCED):
+        result = await controls.commands.ask(_ARM, 0.0, forced)
+        if await until(clock, lambda: picture.armed is False, CONFIRM_S):
+            return
+    raise RefusedError(f"the autopilot stays armed: {controls.reason(result)}")
+
+
+async def land(controls: Controls) -> bool:
+    """Hand over to its LAND mode; whether it is seen in it."""
+    try:
+        await enter_mode(controls, controls.autopilot.land_mode)
+    except RefusedError:
+        return False
+    return True
+
+
+def cut(controls: Controls) -> None:
+    """One forced disarm, in the air too; nothing is waited for."""
+    controls.commands.tell(_ARM, 0.0, FORCED)
+
+
+async def _lands(controls: Controls) -> bool:
+    if controls.picture.armed is False:
+        return True
+    if not await land(controls):
+        return False
+    return await until(controls.clock, lambda: controls.picture.armed is False, LAND_LIMIT_S)

@@ -1,0 +1,347 @@
+"""The MAVLink link: `mavlink+udp://0.0.0.0:14540?autopilot=px4`, `mavlink+tcp://`, `mavlink+serial://`.
+
+Everything happens in the event loop: a setpoint is encoded and handed to the socket in `send` itself, by the rules of
+`outbox`. There is no fallback setpoint: from 100 ms without a fresh one there is silence, and the autopilot's failsafe
+acts, whose parameters were read back before arming. Whoever changes the mode, the pilot first of all, has the vehicle.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections import deque
+from collections.abc import Mapping
+from types import TracebackType
+from typing import Self
+
+from drivers.mavlink import arming, options, setpoint_wire
+from drivers.mavlink.arming import Controls
+from drivers.mavlink.connection import Connection
+from drivers.mavlink.dialect import Message, mavlink
+from drivers.mavlink.outbox import FALLBACK_NS, Mode, Outbox
+from drivers.mavlink.thrust import ThrustMap
+from drivers.mavlink.transport import SerialPort, Tcp, Transport, Udp
+from drivers.mavlink.waiting import pause, until
+from lcd_flight.model import AttitudeThrust, LinkContext, LinkReport, Quaternion, RefusedError, Transmission
+from lcd_flight.model.frames import from_yaw, yaw_of
+
+STREAM_S = 1.2
+"""Of setpoints before the autopilot is asked for its mode; it wants one second."""
+DESCENT_S = 30.0
+"""So long poses go on to a vehicle that lands by itself while the link closes."""
+STOP_S = 1.0
+"""So long closing goes on repeating an emergency stop that is not confirmed."""
+FLYING_M = 0.15
+"""Above where it stood: higher is in the air."""
+LOG_CAPACITY = 1000
+TEND_NS = 10_000_000
+
+
+def open_udp(address: str, given: Mapping[str, str], context: LinkContext) -> MavlinkLink:
+    """The link behind `mavlink+udp://HOST:PORT`.
+
+    Raises:
+        InputError: not an address, a wrong option, or no signing key where it should be.
+        RefusedError: others may read the signing key.
+    """
+    chosen = options.read("mavlink+udp", address, given)
+    return MavlinkLink(f"mavlink+udp://{address}", chosen, context, udp(address, chosen))
+
+
+def open_tcp(address: str, given: Mapping[str, str], context: LinkContext) -> MavlinkLink:
+    """The link behind `mavlink+tcp://HOST:PORT`.
+
+    Raises:
+        InputError: as `open_udp`.
+        RefusedError: as `open_udp`.
+    """
+    chosen = options.read("mavlink+tcp", address, given)
+    return MavlinkLink(f"mavlink+tcp://{address}", chosen, context, tcp(address, chosen))
+
+
+def open_serial(address: str, given: Mapping[str, str], context: LinkContext) -> MavlinkLink:
+    """The link behind `mavlink+serial://PATH`.
+
+    Raises:
+        InputError: as `open_udp`.
+        RefusedError: as `open_udp`.
+    """
+    chosen = options.read("mavlink+serial", address, given)
+    return MavlinkLink(f"mavlink+serial://{address}", chosen, context, SerialPort(address, chosen.baud))
+
+
+def udp(address: str, chosen: options.MavlinkOptions) -> Udp:
+    """The transport of an address that has been read."""
+    host, _, port = address.rpartition(":")
+    return Udp(host, int(port), call=chosen.role == "call")
+
+
+def tcp(address: str, chosen: options.MavlinkOptions) -> Tcp:
+    """The transport of an address that has been read."""
+    host, _, port = address.rpartition(":")
+    return Tcp(host, int(port), chosen.connect_s)
+
+
+class MavlinkLink:
+    """`lcd_flight.model.Link` to PX4 or ArduPilot."""
+
+    def __init__(self, uri: str, chosen: options.MavlinkOptions, context: LinkContext, transport: Transport) -> None:
+        """See the openers above; `transport` may be anything that carries bytes."""
+        self._connection = Connection(uri, chosen, context, transport)
+        self._options, self._context, self._clock = chosen, context, context.clock
+        self._outbox = Outbox()
+        self._map: ThrustMap | None = None
+        self._tending: asyncio.Task[None] | None = None
+        self._taken_over = self._unfit = ""
+        self._fell_back = self._lost = self._flown = False
+        self._restarts = 0
+        self._sent = self._invalid = 0
+        self._transmitted: deque[Transmission] = deque(maxlen=LOG_CAPACITY)
+
+    async def __aenter__(self) -> Self:
+        """Find the vehicle and set it up; see `Connection`.
+
+        Raises:
+            RefusedError: it is not there, not set up, or does not know where it is; with all that is wrong.
+        """
+        connection = self._connection
+        connection.session.listen(self._watch)
+        try:
+            self._tending = asyncio.create_task(self._tend())
+            await connection.find()
+            await connection.set_up()
+            self._map = self._thrust_map()
+        except BaseException:
+            await self._close()
+            raise
+        self._restarts = connection.picture.restarts
+        connection.picture.say(self.description)
+        for change in connection.changed:
+            connection.picture.say(f"parameter {change}")
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Leave a vehicle in the air to its own LAND mode and its poses until it is down; then close."""
+        picture = self._connection.picture
+        try:
+            if self._outbox.latched:
+                await until(self._clock, lambda: picture.armed is False, STOP_S)
+            elif picture.armed and not self._outbox.over:
+                await self._leave()
+        finally:
+            await self._close()
+
+    @property
+    def description(self) -> str:
+        """Autopilot, version, and what hovering takes."""
+        version = self._connection.picture.version or "of unknown version"
+        thrust = "" if self._map is None else f"; {self._map.described()}"
+        return f"{self._connection.autopilot.name} {version}{thrust}"
+
+    async def arm(self) -> None:
+        """Stream, enter the autopilot's mode, arm, and wait until its motors take thrust. Takes 4 to 9 s.
+
+        Raises:
+            RefusedError: not connected, motors stopped or handed over before, or the vehicle will not, with its reason.
+        """
+        self._require_fit()
+        picture, mode = self._connection.picture, self._connection.autopilot.flight_mode
+        self._flown = self._lost = False
+        self._outbox.idle(self._clock.now_ns())
+        try:
+            await pause(self._clock, STREAM_S)
+            await arming.enter_mode(self._controls, mode)
+            await arming.arm(self._controls)
+            await pause(self._clock, self._connection.autopilot.spool_up_s)
+            if picture.custom_mode != mode or not picture.armed or self._outbox.mode is not Mode.IDLING:
+                raise RefusedError(f"the vehicle was armed, but is in mode {self._mode_name()} now: {self._said()}")
+        except BaseException:
+            self._outbox.rest(self._clock.now_ns())
+            raise
+        self._outbox.ready(self._clock.now_ns())
+
+    async def disarm(self) -> None:
+        """Make a vehicle on the ground disarm; one that flew, by its LAND mode.
+
+        Raises:
+            RefusedError: not connected, or it stays armed.
+        """
+        if self._tending is None:
+            raise RefusedError("the vehicle cannot be disarmed: the link is not open")
+        if self._outbox.over:
+            return
+        now_ns = self._clock.now_ns()
+        if self._connection.picture.armed:
+            self._outbox.idle(now_ns)
+            await arming.disarm(self._controls, flown=self._flown)
+        self._outbox.rest(self._clock.now_ns())
+
+    def send(self, setpoint: AttitudeThrust, stamp_ns: int) -> None:
+        """Send the setpoint of the tick that began at `stamp_ns`, at once; an unfit one is refused and counted."""
+        now_ns = self._clock.now_ns()
+        if self._map is None or self._tending is None:
+            return
+        if not setpoint.is_finite():
+            self._invalid += 1
+            return
+        if self._outbox.admits(stamp_ns, now_ns) and self._transmit(setpoint.q_WB, self._map.share(setpoint.thrust_N)):
+            self._sent += 1
+            self._flown = True
+
+    def stop_motors(self) -> None:
+        """Emergency stop, latched: a forced disarm, repeated until the vehicle says that it is disarmed."""
+        if self._tending is None or self._outbox.latched:
+            return
+        self._outbox.stop(self._clock.now_ns())
+        self._due(self._clock.now_ns())
+
+    def report(self, now_ns: int) -> LinkReport:
+        """What is known now."""
+        session, picture = self._connection.session, self._connection.picture
+        falls_back = self._outbox.falls_back(now_ns)
+        if falls_back and not self._fell_back:
+            picture.say(f"no fresh setpoint for {FALLBACK_NS / 1e6:.0f} ms: silence, the autopilot's own failsafe acts")
+        self._fell_back = falls_back
+        transmitted = tuple(self._transmitted)
+        self._transmitted.clear()
+        return LinkReport(
+            connected=self._tending is not None,
+            age_ns=None if session.newest_ns is None else max(now_ns - session.newest_ns, 0),
+            sent=self._sent,
+            received=session.losses.received,
+            lost=session.losses.lost,
+            stale=self._outbox.stale + self._invalid,
+            loss_share=session.losses.share(now_ns),
+            fallback_active=falls_back,
+            transmitted=transmitted,
+            telemetry=picture.telemetry(now_ns=now_ns, lost=self._lost),
+        )
+
+    @property
+    def _controls(self) -> Controls:
+        connection = self._connection
+        return Controls(connection.autopilot, connection.commands, connection.picture, self._clock)
+
+    def _require_fit(self) -> None:
+        """Refuse to arm what cannot be armed on this connection any more, or not now."""
+        reason = ""
+        if self._tending is None:
+            reason = "the link is not open"
+        elif self._outbox.latched:
+            reason = "its motors were stopped; connect anew"
+        elif self._taken_over:
+            reason = f"{self._taken_over}; connect anew"
+        elif self._connection.picture.restarts != self._restarts:
+            reason = "the autopilot was restarted since it was set up; connect anew"
+        else:
+            reason = self._connection.objection()
+        if reason:
+            raise RefusedError(f"the vehicle will not arm: {reason}")
+
+    def _thrust_map(self) -> ThrustMap:
+        autopilot, given = self._connection.autopilot, self._options
+        hover = given.hover
+        if hover is None:
+            hover = self._connection.parameters.values.get(autopilot.hover_parameter)
+        if hover is None or not 0.05 <= hover <= 0.9:
+            raise RefusedError(f"{autopilot.hover_parameter} is {hover}, no share of thrust to hover at (0.05 to 0.9): "
+                               "set it, or give the option hover")  # fmt: skip
+        slope = autopilot.thrust_slope if given.thrust_slope is None else given.thrust_slope
+        return ThrustMap(hover, slope, self._context.vehicle.weight_N)
+
+    def _transmit(self, q_WB: Quaternion, thrust: float) -> bool:
+        """Validate, encode and send one setpoint, and note its bytes; whether it went."""
+        now_ns = self._clock.now_ns()
+        session = self._connection.session
+        try:
+            message = setpoint_wire.attitude_target(
+                q_WB, thrust, now_ns=now_ns, target=session.vehicle, frame=self._options.frame
+            )
+        except ValueError:
+            self._invalid += 1
+            return False
+        data = session.send(message)
+        if data is None:
+            return False
+        self._transmitted.append(Transmission(now_ns, data.hex()))
+        return True
+
+    async def _tend(self) -> None:
+        """Everything that is due without being asked for, at the control rate."""
+        while True:
+            now_ns = self._clock.now_ns()
+            self._connection.tend(now_ns)
+            self._due(now_ns)
+            await self._clock.sleep_until(now_ns + TEND_NS)
+
+    def _due(self, now_ns: int) -> None:
+        if self._outbox.idles(now_ns):
+            self._transmit(self._level(), 0.0)
+        if self._outbox.stops(now_ns):
+            arming.cut(self._controls)
+
+    def _level(self) -> Quaternion:
+        """At the heading that it has."""
+        pose = self._connection.pose
+        return from_yaw(0.0 if pose is None else yaw_of(pose.q_WB))
+
+    def _watch(self, message: Message, now_ns: int) -> None:
+        """Notice, at each heartbeat, that somebody else flies or that the motors are off."""
+        if message.get_msgId() != mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+            return
+        picture, mode = self._connection.picture, self._outbox.mode
+        if picture.armed is False:
+            self._outbox.confirm_off() if self._outbox.latched else self._note_disarmed()
+        elif mode in (Mode.READY, Mode.FLYING) and picture.custom_mode != self._connection.autopilot.flight_mode:
+            self._hand_over(now_ns)
+
+    def _note_disarmed(self) -> None:
+        """In flight, that is out of our hands."""
+        if self._outbox.mode is Mode.FLYING and self._airborne():
+            self._lost = True
+            self._outbox.hand_over(self._clock.now_ns())
+            self._connection.picture.say(f"the vehicle was disarmed in the air, not by us{self._quoted()}")
+
+    def _hand_over(self, now_ns: int) -> None:
+        alone = self._connection.picture.failsafe or self._outbox.falls_back(now_ns)
+        who = "the autopilot's failsafe" if alone else "the pilot"
+        self._taken_over = f"{who} took over: mode {self._mode_name()}"
+        self._outbox.hand_over(now_ns)
+        self._connection.picture.say(f"{self._taken_over}{self._quoted()}")
+
+    def _airborne(self) -> bool:
+        pose = self._connection.pose
+        return pose is not None and pose.p_WB[2] > self._context.initial_position_m[2] + FLYING_M
+
+    def _mode_name(self) -> str:
+        mode = self._connection.picture.custom_mode
+        return "unknown" if mode is None else self._connection.autopilot.mode_name(mode)
+
+    def _said(self) -> str:
+        return self._connection.picture.texts.recent(self._clock.now_ns()) or "it does not say why"
+
+    def _quoted(self) -> str:
+        texts = self._connection.picture.texts.recent(self._clock.now_ns())
+        return f"; the autopilot says {texts}" if texts else ""
+
+    async def _leave(self) -> None:
+        """Have a vehicle that is still armed land by itself, or disarm where it stands."""
+        picture = self._connection.picture
+        if not self._airborne():
+            with contextlib.suppress(RefusedError):
+                await self.disarm()
+            return
+        self._outbox.land(self._clock.now_ns())
+        if await arming.land(self._controls):
+            await until(self._clock, lambda: picture.armed is False, DESCENT_S)
+
+    async def _close(self) -> None:
+        """Stop tending and close; no task is left."""
+        tending, self._tending = self._tending, None
+        self._map = None
+        if tending is not None:
+            tending.cancel()
+            await asyncio.gather(tending, return_exceptions=True)
+        self._connection.close()

@@ -1,4 +1,4 @@
-"""`lcd sim mavlink`: a PX4 or ArduPilot vehicle for any program that speaks MAVLink (mavsdk, pymavlink, our own link)."""
+"""`lcd sim mavlink`: a PX4 or ArduPilot vehicle for programs that speak MAVLink (mavsdk, pymavlink, our own link)."""
 
 from __future__ import annotations
 

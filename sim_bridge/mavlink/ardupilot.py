@@ -206,14 +206,18 @@ class ArduPilot(Autopilot):
         self._followed = self.has_position
         if self.body.broken:
             self.disarm("Crash: Disarming: AngErr=90>30")
-        elif self.landing and self.landed:
+        elif self.landed and (self.landing or self._idles()):
             self.disarm("Disarming motors")
-        elif self.landed and self.force <= 0.0 and 0.0 < self.parameters["DISARM_DELAY"] < self.idle_s:
-            self.disarm("Disarming motors")
-        elif self.mode in _PLACED and not self.landed and self.estimator.age_s(self.now_ns) > FAILSAFE_S:
-            if self.parameters["FS_EKF_ACTION"]:
-                self.say(CRITICAL, "EKF Failsafe: changed to LAND Mode")
-                self._enter(LAND)
+        elif self._is_lost() and self.parameters["FS_EKF_ACTION"]:
+            self.say(CRITICAL, "EKF Failsafe: changed to LAND Mode")
+            self._enter(LAND)
+
+    def _idles(self) -> bool:
+        return self.force <= 0.0 and 0.0 < self.parameters["DISARM_DELAY"] < self.idle_s
+
+    def _is_lost(self) -> bool:
+        """In the air, without poses for long, in a mode that needs them."""
+        return self.mode in _PLACED and not self.landed and self.estimator.age_s(self.now_ns) > FAILSAFE_S
 
     def _refuse_arming(self, problem: str) -> Result:
         self.say(CRITICAL, f"Arm: {problem}")

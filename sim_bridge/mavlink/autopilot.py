@@ -1,4 +1,4 @@
-"""What both flavours are: something that arms, has a mode, believes where it is and turns rotors. Time comes in as ns."""
+"""What both flavours are: something that arms, has a mode, believes where it is and turns rotors."""
 
 from __future__ import annotations
 
@@ -101,6 +101,10 @@ class Autopilot(ABC):
     @abstractmethod
     def landing(self) -> bool:
         """Whether its mode brings it down."""
+
+    @abstractmethod
+    def announce(self) -> None:
+        """Say what is said after a boot."""
 
     @abstractmethod
     def request_mode(self, mode: int) -> Result:

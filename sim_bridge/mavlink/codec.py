@@ -68,4 +68,5 @@ def _flagged(packet: bytes, crc_extra: int) -> bytes:
     head = packet[:2] + bytes((packet[2] | SIGNED,)) + packet[3:-2]
     crc = common.x25crc(head[1:])
     crc.accumulate(bytes((crc_extra,)))
-    return head + crc.crc.to_bytes(2, "little")
+    checksum: int = crc.crc
+    return head + checksum.to_bytes(2, "little")

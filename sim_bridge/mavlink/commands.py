@@ -1,6 +1,6 @@
 """COMMAND_LONG and COMMAND_INT: what is done about each, and with which result it is acknowledged.
 
-Sources: PX4 1.16, Commander.cpp and mavlink_receiver.cpp; ArduPilot 4.6, GCS_Common.cpp; mavlink.io, "Command Protocol".
+Sources: mavlink.io, "Command Protocol"; PX4 1.16, Commander.cpp, mavlink_receiver.cpp; ArduPilot 4.6, GCS_Common.cpp.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ def _return(_: Params, desk: Desk) -> Result:
     return desk.pilot.request_mode(RTL if isinstance(desk.pilot, Px4) else COPTER_RTL)
 
 
-def _take_off(params: Params, desk: Desk) -> Result:
+def _take_off(_: Params, desk: Desk) -> Result:
     """ArduPilot takes it in GUIDED alone; there it is not simulated."""
     if isinstance(desk.pilot, Px4):
         return desk.pilot.request_mode(TAKEOFF)

@@ -1,8 +1,8 @@
 """Where the autopilot believes it is: inertial sensors, corrected by the poses that come as ODOMETRY.
 
-As in PX4's EKF2 and ArduPilot's EKF3, position, velocity and heading are taken from a pose, roll and pitch are not: they
-come from the gyroscope, and from what the positions say about the acceleration. It is an observer with constant gains,
-not their Kalman filters: poles at 4 rad/s for each axis, where the innovation also turns the attitude that explains it.
+As in PX4's EKF2 and ArduPilot's EKF3, position, velocity and heading are taken from a pose; roll and pitch are not:
+they come from the gyroscope and from what positions say about the acceleration. It is an observer with constant gains,
+not a Kalman filter: poles at 4 rad/s for each axis, where the innovation also turns the attitude that explains it.
 The frame is that of the poses: where their x is not north, its heading is not from north either.
 """
 

@@ -1,7 +1,7 @@
 """The autopilot's axes: world north, east, down (NED) and body forward, right, down (FRD); quaternions (w, x, y, z).
 
-This is the vehicle's own code, written out by components. What clients use is written apart from it on purpose: an error
-would have to be made twice to go unseen.
+This is the vehicle's own code, written out by components. What clients use is written apart from it on purpose: an
+error would have to be made twice to go unseen.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def forward_right_down(v: Vector3) -> Vector3:
 
 
 def ned_attitude(q_WB: Quaternion) -> Hamilton:
-    """The attitude of FRD in NED from that of FLU in ENU (xyzw): a half turn about x on both sides and a quarter turn."""
+    """The attitude of FRD in NED from that of FLU in ENU (xyzw)."""
     x, y, z, w = q_WB
     return (_HALF * (w + z), _HALF * (x + y), _HALF * (x - y), _HALF * (w - z))
 

@@ -1,6 +1,7 @@
 """The autopilot's own flying, where no client tells it an attitude: hold a place, climb, land, stay level.
 
-Proportional, position to velocity to acceleration (PX4: MPC_XY_P 0.95, MPC_XY_VEL_P_ACC 1.8, MPC_Z_P 1, MPC_Z_VEL_P_ACC 4).
+Proportional, from position to velocity to acceleration, with PX4's gains (MPC_XY_P 0.95, MPC_XY_VEL_P_ACC 1.8,
+MPC_Z_P 1, MPC_Z_VEL_P_ACC 4).
 """
 
 from __future__ import annotations

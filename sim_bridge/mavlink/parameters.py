@@ -51,7 +51,7 @@ class Cast:
     """ArduPilot: an int is converted."""
 
     @staticmethod
-    def to_float(value: Value, kind: int) -> float:
+    def to_float(value: Value, _: int) -> float:
         """What stands in the message."""
         return float(value)
 

@@ -1,8 +1,8 @@
 """The simulated MAVLink vehicle on UDP, as PX4's simulation has it, or on TCP, as ArduPilot's has it; poses go out.
 
 UDP: it takes a free port of its own and sends to HOST:PORT, where clients listen, and to whoever talks to it. TCP: it
-listens on HOST:PORT. A task brings the vehicle to now every 4 ms on absolute deadlines, so it lives in real time however
-busy the machine is, and takes datagrams as they come.
+listens on HOST:PORT. A task brings the vehicle to now every 4 ms on absolute deadlines, so it lives in real time
+however busy the machine is, and takes datagrams as they come.
 """
 
 from __future__ import annotations

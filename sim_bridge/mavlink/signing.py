@@ -1,8 +1,8 @@
 """MAVLink 2 signatures as the autopilot checks them. Time comes in as an argument.
 
-Source: mavlink.io, "Message Signing": sha256 of key, packet, link and time stamp, cut to 6 bytes; time stamps count 10 us
-since 2015 and grow within each stream; a new stream may be no older than a minute. Nothing is remembered of a packet whose
-signature is wrong.
+Source: mavlink.io, "Message Signing": sha256 of key, packet, link and time stamp, cut to 6 bytes; time stamps count
+10 us since 2015 and grow within each stream; a new stream may be no older than a minute. Nothing is remembered of a
+packet whose signature is wrong.
 """
 
 from __future__ import annotations

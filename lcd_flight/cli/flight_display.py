@@ -24,10 +24,11 @@ PHASE_LABELS = {
     Phase.BRAKE_HOLD: "BRAKE",
     Phase.LAND_NOW: "LAND NOW",
     Phase.DESCEND_BLIND: "DESCEND",
+    Phase.HANDED_OVER: "HANDED OVER",
     Phase.KILL: "CUT",
     Phase.CRASHED: "CRASHED",
 }
-_ABNORMAL = (Phase.BRAKE_HOLD, Phase.LAND_NOW, Phase.DESCEND_BLIND, Phase.KILL, Phase.CRASHED)
+_ABNORMAL = (Phase.BRAKE_HOLD, Phase.LAND_NOW, Phase.DESCEND_BLIND, Phase.HANDED_OVER, Phase.KILL, Phase.CRASHED)
 
 
 class FlightDisplay:

@@ -33,8 +33,10 @@ class Event(IntEnum):
     BRAKE = 10
     LAND = 11
     DESCEND = 12
-    KILL = 13
-    CRASHED = 14
+    TAKEN_OVER = 13
+    """Somebody else flies the vehicle now."""
+    KILL = 14
+    CRASHED = 15
     """The vehicle says so itself, or it is seen on the ground."""
 
 
@@ -79,6 +81,7 @@ _ON_GROUND = {
     Event.BRAKE: Phase.IDLE,
     Event.LAND: Phase.IDLE,
     Event.DESCEND: Phase.IDLE,
+    Event.TAKEN_OVER: Phase.IDLE,
     Event.KILL: Phase.KILL,
     Event.CRASHED: Phase.CRASHED,
 }
@@ -89,12 +92,14 @@ _ON_THE_WAY = {
     Event.BRAKE: Phase.BRAKE_HOLD,
     Event.LAND: Phase.LAND_NOW,
     Event.DESCEND: Phase.DESCEND_BLIND,
+    Event.TAKEN_OVER: Phase.HANDED_OVER,
     Event.KILL: Phase.KILL,
     Event.CRASHED: Phase.CRASHED,
 }
 _GOING_DOWN = {
     Event.TOUCHDOWN: Phase.LANDED,
     Event.DESCEND: Phase.DESCEND_BLIND,
+    Event.TAKEN_OVER: Phase.HANDED_OVER,
     Event.KILL: Phase.KILL,
     Event.CRASHED: Phase.CRASHED,
 }
@@ -113,12 +118,14 @@ TABLE: Mapping[Phase, Mapping[Event, Phase]] = {
         Event.EXPIRED: Phase.LAND_NOW,
         Event.LAND: Phase.LAND_NOW,
         Event.DESCEND: Phase.DESCEND_BLIND,
+        Event.TAKEN_OVER: Phase.HANDED_OVER,
         Event.KILL: Phase.KILL,
         Event.CRASHED: Phase.CRASHED,
     },
     Phase.LAND_NOW: {Event.EXPIRED: Phase.DESCEND_BLIND, **_GOING_DOWN},
     Phase.DESCEND_BLIND: {Event.EXPIRED: Phase.KILL, **_GOING_DOWN},
     Phase.LANDED: {Event.KILL: Phase.KILL, Event.CRASHED: Phase.CRASHED},
+    Phase.HANDED_OVER: {},
     Phase.KILL: {},
     Phase.CRASHED: {},
 }

@@ -101,6 +101,8 @@ class Story:
             return Outcome.REFUSED
         if self.phase is Phase.CRASHED:
             return Outcome.CRASHED
+        if self.phase is Phase.HANDED_OVER:
+            return Outcome.ABORTED
         if self.landed_from is None:
             return Outcome.CUT
         return Outcome.LANDED if self.landed_from is Phase.LAND else Outcome.ABORTED
@@ -111,5 +113,7 @@ class Story:
         return "" if self.turn is None else self.turn.message
 
 
-_ABNORMAL = frozenset({Phase.BRAKE_HOLD, Phase.LAND_NOW, Phase.DESCEND_BLIND, Phase.KILL, Phase.CRASHED})
+_ABNORMAL = frozenset(
+    {Phase.BRAKE_HOLD, Phase.LAND_NOW, Phase.DESCEND_BLIND, Phase.HANDED_OVER, Phase.KILL, Phase.CRASHED}
+)
 _ON_PLAN = frozenset({Phase.TAKEOFF, Phase.HOLD, Phase.TRACK, Phase.LAND})

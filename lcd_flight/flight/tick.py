@@ -29,7 +29,7 @@ from lcd_flight.model import (
     Vector3,
 )
 from lcd_flight.safety.evidence import PERIOD_NS, SafetyMemory, Scope, gather
-from lcd_flight.safety.monitors import VEHICLE_CRASHED, judge
+from lcd_flight.safety.monitors import TAKEN_OVER, VEHICLE_CRASHED, judge
 
 MAX_STEP_S = 0.05
 """A longer pause moves the plan on by this much only: the vehicle did not fly it either."""
@@ -38,6 +38,7 @@ EXPIRED = "phase_expired"
 
 _OF_CODE = {
     EXPIRED: Event.EXPIRED,
+    TAKEN_OVER: Event.TAKEN_OVER,
     VEHICLE_CRASHED: Event.CRASHED,
     FALLEN: Event.CRASHED,
     HARD_LANDING: Event.CRASHED,

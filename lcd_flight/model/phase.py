@@ -23,6 +23,8 @@ class Phase(StrEnum):
     """Descend from where it is, under position control."""
     DESCEND_BLIND = "descend_blind"
     """No valid pose: level, slightly below hover thrust, for a stated time."""
+    HANDED_OVER = "handed_over"
+    """The pilot, or the vehicle by itself, flies from here on: nothing is sent any more."""
     KILL = "kill"
     """Motors stopped; latched."""
     CRASHED = "crashed"
@@ -36,7 +38,7 @@ class Phase(StrEnum):
     @property
     def over(self) -> bool:
         """Whether the flight is finished."""
-        return self in (Phase.LANDED, Phase.KILL, Phase.CRASHED)
+        return self in (Phase.LANDED, Phase.HANDED_OVER, Phase.KILL, Phase.CRASHED)
 
 
 _AIRBORNE = frozenset(

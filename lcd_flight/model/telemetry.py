@@ -61,6 +61,8 @@ class LinkReport:
     """Whether the link is flying its own fallback for want of a fresh setpoint."""
     quality: float | None = None
     """Share of radio packets that were acknowledged without being repeated, where there is a radio."""
+    taken_over: str = ""
+    """Who flies in our place, e.g. `the pilot took over: mode POSCTL`; for good. Empty while nobody does."""
     transmitted: tuple[Transmission, ...] = ()
     """Setpoints that went out since the last report, byte for byte, where the link can tell."""
     telemetry: Telemetry | None = None

@@ -19,7 +19,7 @@ LOSSY = 0.1
 OLD_POSE_NS = 50_000_000
 """Red from here on: what the eye should fall upon, not what the flight judges by."""
 
-_ABNORMAL = (Phase.BRAKE_HOLD, Phase.LAND_NOW, Phase.DESCEND_BLIND, Phase.KILL, Phase.CRASHED)
+_ABNORMAL = (Phase.BRAKE_HOLD, Phase.LAND_NOW, Phase.DESCEND_BLIND, Phase.HANDED_OVER, Phase.KILL, Phase.CRASHED)
 
 
 def render(picture: Picture, now_s: float) -> RenderableType:

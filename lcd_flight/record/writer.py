@@ -26,7 +26,7 @@ CHUNK_BYTES = 64 * 1024
 FLUSH_EACH_NS = 500_000_000
 """In the ticks' own time, so that equal ticks make equal chunks."""
 
-_GIVEN_UP = frozenset({Phase.LAND_NOW, Phase.DESCEND_BLIND, Phase.KILL, Phase.CRASHED})
+_GIVEN_UP = frozenset({Phase.LAND_NOW, Phase.DESCEND_BLIND, Phase.HANDED_OVER, Phase.KILL, Phase.CRASHED})
 _AT_THE_END = frozenset({MotorRequest.DISARM, MotorRequest.STOP})
 
 

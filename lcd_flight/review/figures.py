@@ -168,6 +168,8 @@ def _outcome(series: Series) -> Outcome | None:
     landed = np.flatnonzero(series.phase == Phase.LANDED.value)
     if last is Phase.CRASHED:
         return Outcome.CRASHED
+    if last is Phase.HANDED_OVER:
+        return Outcome.ABORTED
     if len(landed):
         before = series.phase[max(int(landed[0]) - 1, 0)]
         return Outcome.LANDED if before == Phase.LAND.value else Outcome.ABORTED

@@ -29,6 +29,7 @@ _BANDS = {
     Phase.BRAKE_HOLD: "abnormal",
     Phase.LAND_NOW: "abnormal",
     Phase.DESCEND_BLIND: "abnormal",
+    Phase.HANDED_OVER: "abnormal",
     Phase.KILL: "abnormal",
     Phase.CRASHED: "abnormal",
 }

@@ -62,6 +62,8 @@ class Evidence:
     link_age_s: float
     """Since the vehicle's newest packet; infinite before the first."""
     disconnected: bool
+    taken_over: str
+    """Who flies in our place; empty where nobody does."""
     loss_share: float
     telemetry: Telemetry | None
     state: State | None
@@ -122,6 +124,7 @@ def gather(
         reject_reason=inputs.pose.reject_reason,
         link_age_s=math.inf if link.age_ns is None else link.age_ns * 1e-9,
         disconnected=not link.connected,
+        taken_over=link.taken_over,
         loss_share=link.loss_share,
         telemetry=link.telemetry,
         state=state,

@@ -18,6 +18,9 @@ from lcd_flight.safety.fence import stopping_margin_m
 VEHICLE_CRASHED = "vehicle_crashed"
 """Code of the finding that is adopted rather than reacted to."""
 
+TAKEN_OVER = "taken_over"
+"""Code of the finding after which somebody else flies."""
+
 _FEW_PACKETS_S = 0.5
 """A share of a handful of packets says nothing; by then there are some."""
 
@@ -36,7 +39,7 @@ class Monitor:
     limit: float
     severity: Severity
     message: str
-    """`{value}` and `{limit}` are filled in, multiplied by `scale`; `{reason}` is the pose filter's."""
+    """`{value}` and `{limit}` are filled in, multiplied by `scale`; `{reason}` is the pose filter's, `{who}` the link's."""
     scale: float = 1.0
     below: bool = False
     """Whether the breach is below the limit instead of above."""
@@ -50,7 +53,7 @@ class Monitor:
     def finding(self, value: float, evidence: Evidence) -> Finding:
         """The finding of a breach."""
         shown, limit = value * self.scale, self.limit * self.scale
-        text = self.message.format(value=shown, limit=limit, reason=evidence.reject_reason)
+        text = self.message.format(value=shown, limit=limit, reason=evidence.reject_reason, who=evidence.taken_over)
         return Finding(self.code, self.severity, text, value, self.limit)
 
 
@@ -152,6 +155,10 @@ def _link(limits: SafetyLimits) -> tuple[Monitor, ...]:
     return (
         Monitor(
             "link_closed", "the link's own report", lambda e: float(e.disconnected), 0.0, Severity.LAND, closed,
+            scope=Scope.ARMED,
+        ),
+        Monitor(
+            TAKEN_OVER, "the link's own report", lambda e: float(bool(e.taken_over)), 0.0, Severity.LAND, "{who}",
             scope=Scope.ARMED,
         ),
         Monitor("link_age", age, _link_age_s, limits.link_timeout_s, Severity.BRAKE, silent, 1e3),

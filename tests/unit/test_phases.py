@@ -27,29 +27,36 @@ SEVERITY = {
     Phase.LAND_NOW: 2,
     Phase.DESCEND_BLIND: 3,
     Phase.LANDED: 4,
+    Phase.HANDED_OVER: 4,
     Phase.KILL: 5,
     Phase.CRASHED: 5,
 }
-FAULTS = (Event.BRAKE, Event.LAND, Event.DESCEND, Event.KILL, Event.CRASHED)
+FAULTS = (Event.BRAKE, Event.LAND, Event.DESCEND, Event.TAKEN_OVER, Event.KILL, Event.CRASHED)
 
 # Every transition there is, written out once more; every other pair must leave the phase as it is.
 EXPECTED = """
 idle:          CHECK preflight, KILL kill, CRASHED crashed
-preflight:     CHECKED ready, BRAKE idle, LAND idle, DESCEND idle, KILL kill, CRASHED crashed
-ready:         ARM armed, EXPIRED idle, BRAKE idle, LAND idle, DESCEND idle, KILL kill, CRASHED crashed
-armed:         TAKEOFF takeoff, EXPIRED idle, BRAKE idle, LAND idle, DESCEND idle, KILL kill, CRASHED crashed
-takeoff:       HOLD_LEG hold, TRACK_LEG track, LAND_LEG land, BRAKE brake_hold, LAND land_now, DESCEND descend_blind,
-               KILL kill, CRASHED crashed
-hold:          HOLD_LEG hold, TRACK_LEG track, LAND_LEG land, BRAKE brake_hold, LAND land_now, DESCEND descend_blind,
-               KILL kill, CRASHED crashed
-track:         HOLD_LEG hold, TRACK_LEG track, LAND_LEG land, BRAKE brake_hold, LAND land_now, DESCEND descend_blind,
-               KILL kill, CRASHED crashed
-land:          TOUCHDOWN landed, EXPIRED land_now, BRAKE land_now, LAND land_now, DESCEND descend_blind, KILL kill,
+preflight:     CHECKED ready, BRAKE idle, LAND idle, DESCEND idle, TAKEN_OVER idle, KILL kill,
                CRASHED crashed
-brake_hold:    RESUME hold, EXPIRED land_now, LAND land_now, DESCEND descend_blind, KILL kill, CRASHED crashed
-land_now:      TOUCHDOWN landed, EXPIRED descend_blind, DESCEND descend_blind, KILL kill, CRASHED crashed
-descend_blind: TOUCHDOWN landed, EXPIRED kill, DESCEND descend_blind, KILL kill, CRASHED crashed
+ready:         ARM armed, EXPIRED idle, BRAKE idle, LAND idle, DESCEND idle, TAKEN_OVER idle, KILL kill,
+               CRASHED crashed
+armed:         TAKEOFF takeoff, EXPIRED idle, BRAKE idle, LAND idle, DESCEND idle, TAKEN_OVER idle, KILL kill,
+               CRASHED crashed
+takeoff:       HOLD_LEG hold, TRACK_LEG track, LAND_LEG land, BRAKE brake_hold, LAND land_now, DESCEND descend_blind,
+               TAKEN_OVER handed_over, KILL kill, CRASHED crashed
+hold:          HOLD_LEG hold, TRACK_LEG track, LAND_LEG land, BRAKE brake_hold, LAND land_now, DESCEND descend_blind,
+               TAKEN_OVER handed_over, KILL kill, CRASHED crashed
+track:         HOLD_LEG hold, TRACK_LEG track, LAND_LEG land, BRAKE brake_hold, LAND land_now, DESCEND descend_blind,
+               TAKEN_OVER handed_over, KILL kill, CRASHED crashed
+land:          TOUCHDOWN landed, EXPIRED land_now, BRAKE land_now, LAND land_now, DESCEND descend_blind,
+               TAKEN_OVER handed_over, KILL kill, CRASHED crashed
+brake_hold:    RESUME hold, EXPIRED land_now, LAND land_now, DESCEND descend_blind, TAKEN_OVER handed_over,
+               KILL kill, CRASHED crashed
+land_now:      TOUCHDOWN landed, EXPIRED descend_blind, DESCEND descend_blind, TAKEN_OVER handed_over,
+               KILL kill, CRASHED crashed
+descend_blind: TOUCHDOWN landed, EXPIRED kill, DESCEND descend_blind, TAKEN_OVER handed_over, KILL kill, CRASHED crashed
 landed:        KILL kill, CRASHED crashed
+handed_over:
 kill:
 crashed:
 """
@@ -71,7 +78,16 @@ def test_every_pair(phase: Phase, event: Event) -> None:
 
 
 def test_table_names_every_phase() -> None:
-    assert set(TABLE) == set(Phase) == {phase for phase, _ in expected()} | {Phase.KILL, Phase.CRASHED}
+    assert (
+        set(TABLE)
+        == set(Phase)
+        == {phase for phase, _ in expected()}
+        | {
+            Phase.HANDED_OVER,
+            Phase.KILL,
+            Phase.CRASHED,
+        }
+    )
 
 
 @pytest.mark.parametrize(("phase", "event"), [(p, e) for p, e in product(Phase, Event) if p not in GROUND])
@@ -83,13 +99,14 @@ def test_severity_only_rises_except_by_resume(phase: Phase, event: Event) -> Non
 
 
 @pytest.mark.parametrize("event", Event)
-def test_kill_and_crash_are_latched(event: Event) -> None:
+def test_kill_crash_and_hand_over_are_latched(event: Event) -> None:
+    assert after(Phase.HANDED_OVER, event) is Phase.HANDED_OVER
     assert after(Phase.KILL, event) is Phase.KILL
     assert after(Phase.CRASHED, event) is Phase.CRASHED
 
 
-@pytest.mark.parametrize("phase", [p for p in Phase if p not in (Phase.KILL, Phase.CRASHED)])
-def test_the_motors_can_be_stopped_from_everywhere(phase: Phase) -> None:
+@pytest.mark.parametrize("phase", [p for p in Phase if p not in (Phase.KILL, Phase.CRASHED, Phase.HANDED_OVER)])
+def test_the_motors_can_be_stopped_from_everywhere_while_we_fly(phase: Phase) -> None:
     assert after(phase, Event.KILL) is Phase.KILL
 
 
@@ -104,7 +121,7 @@ def test_only_an_armed_vehicle_takes_off() -> None:
     assert lifts == {(Phase.ARMED, Event.TAKEOFF)}
 
 
-@pytest.mark.parametrize("phase", [Phase.LANDED, Phase.KILL, Phase.CRASHED])
+@pytest.mark.parametrize("phase", [Phase.LANDED, Phase.HANDED_OVER, Phase.KILL, Phase.CRASHED])
 def test_a_finished_flight_never_flies_again(phase: Phase) -> None:
     reached, fringe = {phase}, [phase]
     while fringe:

@@ -44,7 +44,7 @@ class FlightDisplay:
         """Take an event; never waits. The first begins the thread, which so inherits the priority of the loop."""
         if self._thread.ident is None:  # decision 0081: below the loop's priority it could keep ticks waiting
             self._thread.start()
-        telling = not isinstance(event, Flying) or event.entered or event.findings
+        telling = not isinstance(event, Flying) or event.entered or event.findings or event.messages
         if telling or self._queue.qsize() < CAPACITY:
             self._queue.put(event)
 
@@ -90,6 +90,8 @@ class FlightDisplay:
     def _flying(self, event: Flying) -> None:
         if event.entered and event.phase in PHASE_LABELS:
             self._terminal.line(PHASE_LABELS[event.phase], _entered(event), "red" if event.phase in _ABNORMAL else "")
+        for message in event.messages:
+            self._terminal.line("VEHICLE", message)
         for finding in event.findings:
             self._terminal.warn(f"{event.time_s:.1f}s {finding.message}")
         if event.phase.airborne:

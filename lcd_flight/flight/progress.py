@@ -15,6 +15,8 @@ from lcd_flight.safety.preflight import Check
 REPORT_NS = 100_000_000
 QUIET_NS = 1_000_000_000
 """A finding that comes and goes is told once in this time."""
+MAX_MESSAGES = 10
+"""All of them are in the log."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,13 +78,15 @@ class Flying:
     """Ticks in the time since the last report."""
     findings: tuple[Finding, ...]
     """Warnings and worse that began since the last report."""
+    messages: tuple[str, ...] = ()
+    """What the vehicle and its link said since the last report; the first `MAX_MESSAGES` of a tick."""
 
 
 Progress = Callable[[Connected | Checked | ByHand | Flying], None]
 
 
 class Reporter:
-    """The observer behind `Flying`: reports at each change of phase or leg, at each new finding, and at 10 Hz."""
+    """The observer behind `Flying`: reports at each change of phase or leg, each new finding or message, and at 10 Hz."""
 
     def __init__(self, setup: FlightSetup, progress: Progress) -> None:
         self._setup, self._progress = setup, progress
@@ -103,9 +107,11 @@ class Reporter:
             self._max_error_m = max(self._max_error_m, math.hypot(*tick.position_error_W))
         entered = (tick.phase, tick.leg) != self._where
         findings = self._new_findings(tick)
+        telemetry = inputs.link.telemetry
+        messages = () if telemetry is None else telemetry.messages[:MAX_MESSAGES]
         due = self._reported_ns is None or tick.now_ns - self._reported_ns >= REPORT_NS
-        if entered or findings or due:
-            self._progress(self._report(inputs, tick, entered, findings))
+        if entered or findings or messages or due:
+            self._progress(self._report(inputs, tick, entered, findings, messages))
             self._where, self._reported_ns, self._ticks = (tick.phase, tick.leg), tick.now_ns, 0
 
     def close(self) -> None:
@@ -119,7 +125,9 @@ class Reporter:
             self._told_ns[finding.code] = decided.now_ns
         return new
 
-    def _report(self, inputs: TickInputs, decided: Tick, entered: bool, findings: tuple[Finding, ...]) -> Flying:
+    def _report(
+        self, inputs: TickInputs, decided: Tick, entered: bool, findings: tuple[Finding, ...], messages: tuple[str, ...]
+    ) -> Flying:
         legs, now_ns = self._setup.plan.legs, decided.now_ns
         leg = legs[decided.leg] if decided.leg >= 0 else None
         knots = None if leg is None or leg.waypoints is None else leg.trajectory.knot_times_s
@@ -142,4 +150,5 @@ class Reporter:
             battery_V=None if telemetry is None else telemetry.battery_V,
             rate_hz=self._ticks * 1e9 / since_ns if since_ns > 0 else 0.0,
             findings=findings,
+            messages=messages,
         )

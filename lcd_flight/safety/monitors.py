@@ -39,7 +39,7 @@ class Monitor:
     limit: float
     severity: Severity
     message: str
-    """`{value}` and `{limit}` are filled in, multiplied by `scale`; `{reason}` is the pose filter's, `{who}` the link's."""
+    """`{value}` and `{limit}` are filled in, times `scale`; `{reason}` is the pose filter's, `{who}` the link's."""
     scale: float = 1.0
     below: bool = False
     """Whether the breach is below the limit instead of above."""

@@ -62,6 +62,14 @@ class TestReporter:
         telling = [e for e in told(rejects) if e.findings]
         assert [round(e.time_s, 2) for e in telling] == [3.0, 5.0]
 
+    def test_what_the_vehicle_says_is_told_at_once_and_a_flood_of_it_is_cut(self) -> None:
+        def talks(tick: int, inputs: TickInputs) -> TickInputs:
+            return with_telemetry(inputs, messages=tuple(f"warning: {n}" for n in range(50)) if tick == 207 else ())
+
+        telling = [e for e in told(talks) if e.messages]
+        assert [round(e.time_s, 2) for e in telling] == [2.07]
+        assert telling[0].messages == tuple(f"warning: {n}" for n in range(10))
+
     def test_remembers_the_largest_error(self) -> None:
         events = told()
         assert events[-1].max_error_m == max(e.max_error_m for e in events)

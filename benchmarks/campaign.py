@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.campaign_crazyflie_fuzz import crazyflie_fuzz
+from benchmarks.campaign_mavlink_fuzz import mavlink_fuzz
 from benchmarks.campaign_rotorpy import rotorpy_crash_rates
 from benchmarks.campaign_sigkill import killed_flights
 from lcd_flight import api
@@ -83,6 +84,7 @@ def _word(verdict: dict[str, Any]) -> str:
 CAMPAIGNS: dict[str, Callable[[], dict[str, Any]]] = {
     "rehearsed-tasks": rehearsed_tasks,
     "crazyflie-fuzz": crazyflie_fuzz,
+    "mavlink-fuzz": mavlink_fuzz,
     "killed-flights": killed_flights,
     "rotorpy-crash-rates": rotorpy_crash_rates,
 }

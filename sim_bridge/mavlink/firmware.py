@@ -17,11 +17,13 @@ from sim_bridge.mavlink.commands import acknowledgement, execute
 from sim_bridge.mavlink.parameters import Parameters
 from sim_bridge.mavlink.px4 import Px4
 
+HASH = "_HASH_CHECK"
+"""What PX4 begins its list with; writing it ends the list."""
 COMPONENT = common.MAV_COMP_ID_AUTOPILOT1
 EVERYBODY = 0
 MOST_WAITING = 500
 """Answers that are not sent yet; more are lost."""
-LISTED_EACH = 2
+LISTED_EACH = 5
 """Parameters of a list that are sent in a period."""
 READ_NS, WRITE_NS, REBOOT_NS = 100_000_000, 20_000_000, 100_000_000
 """How long ArduPilot takes to answer; until a reboot begins."""
@@ -50,6 +52,8 @@ class Firmware:
         """When it is going to reboot."""
         self.key: bytes | None = None
         """A key that came in SETUP_SIGNING; all zeros remove the one there is."""
+        self.tells_param_errors = False
+        """Whether it has PARAM_ERROR."""
         self.rejected: frozenset[int] = frozenset()
         """Commands that are denied, whatever they ask for: a fault."""
         self._acts: dict[int, Callable[[Heard], None]] = {
@@ -131,10 +135,10 @@ class Firmware:
         ready = []
         while self._later and self._later[0][0] <= now_ns:
             ready.append(heapq.heappop(self._later)[2])
-        for _ in range(LISTED_EACH if self._listed is not None else 0):
-            if self._listed is not None:
-                ready.append(self._parameters.message(self._listed))
-                self._listed = self._listed + 1 if self._listed + 1 < len(self._parameters) else None
+        if self._listed is not None:
+            upto = min(self._listed + LISTED_EACH, len(self._parameters))
+            ready += [self._parameters.message(index) for index in range(self._listed, upto)]
+            self._listed = upto if upto < len(self._parameters) else None
         return ready
 
     def _texted(self) -> list[Any]:
@@ -172,25 +176,38 @@ class Firmware:
             self._answer(acknowledgement(kind, result, heard.system, heard.component))
 
     def _list(self, _: Heard) -> None:
+        if isinstance(self.pilot, Px4):
+            self._answer(self._parameters.hash_message(HASH))
         self._listed = 0
 
     def _read(self, heard: Heard) -> None:
-        """An unknown one is answered by PX4 with a text, by ArduPilot with nothing."""
+        """An unknown name is answered with nothing, an unknown number by PX4 with a text."""
         name, index = heard.message.param_id, heard.message.param_index
         found = self._parameters.find(name, index)
         if found is not None:
             self._answer(self._parameters.message(found), READ_NS if isinstance(self.pilot, ArduPilot) else 0)
-        elif isinstance(self.pilot, Px4):
-            self.pilot.say(INFO, f"[pm] unknown param ID: {_plain(name)}")
+        elif isinstance(self.pilot, Px4) and name == HASH and index < 0:
+            self._answer(self._parameters.hash_message(HASH))
+        else:
+            self._miss(heard, f"[pm] unknown param ID: {index}" if index >= 0 else "", index)
+
+    def _miss(self, heard: Heard, text: str, index: int) -> None:
+        """There is no such parameter: say so as the firmware does."""
+        if self.tells_param_errors:
+            name = heard.message.param_id.encode()[:16]
+            error = common.MAV_PARAM_ERROR_DOES_NOT_EXIST
+            self._answer(common.MAVLink_param_error_message(heard.system, heard.component, name, index, error))
+        elif text and isinstance(self.pilot, Px4):
+            self.pilot.say(INFO, text)
 
     def _write(self, heard: Heard) -> None:
         message = heard.message
         found = self._parameters.find(message.param_id, -1)
-        if found is None:
-            if isinstance(self.pilot, Px4):
-                self.pilot.say(INFO, f"[pm] unknown param: {_plain(message.param_id)}")
-            return
-        if self._parameters.write(message.param_id, message.param_value, message.param_type):
+        if isinstance(self.pilot, Px4) and message.param_id == HASH:
+            self._listed = None
+        elif found is None:
+            self._miss(heard, f"[pm] unknown param: {_plain(message.param_id)}", -1)
+        elif self._parameters.write(message.param_id, message.param_value, message.param_type):
             told = self._parameters.echo(found, message.param_value)
             self._answer(told, WRITE_NS if isinstance(self.pilot, ArduPilot) else 0)
 

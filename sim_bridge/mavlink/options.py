@@ -19,6 +19,8 @@ class MavlinkOptions(msgspec.Struct, frozen=True):
     system: Annotated[int, msgspec.Meta(ge=1, le=255)] = 1
     defaults: Literal["ready", "factory"] = "ready"
     """Parameters to begin with: set up for external poses, or as the firmware comes."""
+    param_error: bool = False
+    """Whether unknown parameters are answered with PARAM_ERROR, as firmware newer than 1.16 and 4.6 does."""
     boot_s: Seconds | None = None
     """Until it can be armed; None: 2 s, on ArduPilot 20 s."""
     hover_thrust: Annotated[float, msgspec.Meta(gt=0.0, lt=1.0)] | None = None

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import struct
+import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
@@ -119,6 +120,16 @@ class Parameters:
         """PARAM_VALUE of one."""
         parameter = self._table[index]
         return self._message(index, self._coding.to_float(self._values[parameter.name], parameter.kind))
+
+    def hash_message(self, name: str) -> common.MAVLink_param_value_message:
+        """PARAM_VALUE of a checksum over all of them, by which a ground station knows what it has kept."""
+        told = ",".join(self._values).encode()
+        values = struct.pack(f"<{len(self._table)}d", *map(float, self._values.values()))
+        # The lower bits alone, so that its bytes are no special float, which would not come out as they went in.
+        bits = zlib.crc32(told + values) & 0x3FFFFFFF
+        value: float = struct.unpack("<f", struct.pack("<I", bits))[0]
+        kind = common.MAV_PARAM_TYPE_UINT32
+        return common.MAVLink_param_value_message(name.encode(), value, kind, len(self._table), 2**16 - 1)
 
     def echo(self, index: int, told: float) -> common.MAVLink_param_value_message:
         """PARAM_VALUE after writing; one that does not hold says that it does."""

@@ -108,7 +108,9 @@ class SimulatedMavlink:
 
     def _booted(self) -> Firmware:
         pilot = boot(self.options, self.body, self.parameters, self._time_ns)
-        return Firmware(pilot, self.parameters, self.options.system, self._unix_ns)
+        firmware = Firmware(pilot, self.parameters, self.options.system, self._unix_ns)
+        firmware.tells_param_errors = self.options.param_error
+        return firmware
 
     def _change_key(self) -> None:
         """SETUP_SIGNING came: all zeros remove the key."""

@@ -119,23 +119,13 @@ class Client:
         """One ODOMETRY in LOCAL_FRD and BODY_FRD from vision, or as said otherwise."""
         told = {"frame": 20, "child": 12, "resets": 0, "kind": 2, "quality": 100, "v": (math.nan,) * 3, **more}
         unknown = [math.nan] + [0.0] * 20
+        twist = (*told["v"], 0.0, 0.0, 0.0)
+        about = (told["resets"], told["kind"], told["quality"])
+        stamp_us = self.now_ns // 1000
         self.send(
             dialect.MAVLink_odometry_message(
-                self.now_ns // 1000,
-                told["frame"],
-                told["child"],
-                *p,
-                list(q),
-                *told["v"],
-                0.0,
-                0.0,
-                0.0,
-                unknown,
-                unknown,
-                told["resets"],
-                told["kind"],
-                told["quality"],
-            )  # fmt: skip
+                stamp_us, told["frame"], told["child"], *p, list(q), *twist, unknown, unknown, *about
+            )
         )
 
     def watch(

@@ -21,7 +21,9 @@ def mavlink(
         str | None, typer.Argument(metavar="[MISSION]", help="Take vehicle, place and motion capture from it.")
     ] = None,
     flavour: Annotated[str, typer.Option(help="px4 or ardupilot.")] = "px4",
-    port: Annotated[int, typer.Option(help="UDP port that clients listen on.", min=0, max=65535)] = 14540,
+    port: Annotated[
+        int | None, typer.Option(help="UDP port that clients listen on, 14540; with --tcp 5760.", min=0, max=65535)
+    ] = None,
     host: Annotated[str, typer.Option(help="Where they are.")] = "127.0.0.1",
     tcp: Annotated[bool, typer.Option(help="Listen on TCP instead, as ArduPilot's simulation on 5760.")] = False,
     vehicle: Annotated[str | None, typer.Option(help="Airframe: one that ships or a file.")] = None,
@@ -54,9 +56,14 @@ def mavlink(
         "defaults": defaults,
         "key_file": key_file,
     }
-    address = f"{'tcp:' if tcp else ''}{host}:{port}"
+    address = f"{'tcp:' if tcp else ''}{host}:{_port(port, tcp)}"
     told = serve("mavlink", address, {**_as_text(options), **_faults(fault or [])}, bench, terminal, seconds)
     return terminal.finish(Outcome.OK, told)
+
+
+def _port(port: int | None, tcp: bool) -> int:
+    """As the simulations of PX4 and ArduPilot have it, unless said otherwise."""
+    return port if port is not None else (5760 if tcp else 14540)
 
 
 def _faults(given: list[str]) -> dict[str, str]:

@@ -7,8 +7,9 @@ from collections.abc import Callable
 
 from lcd_flight.model import InputError, LinkContext
 from lcd_flight.model.frames import tilt_of
-from sim_bridge.mavlink.faults import Timed, kind_of, spoil
+from sim_bridge.mavlink.faults import Timed, kind_of
 from sim_bridge.mavlink.intruder import Intruder
+from sim_bridge.mavlink.mocap_view import MocapView
 from sim_bridge.mavlink.options import MavlinkOptions
 from sim_bridge.mavlink.radio import Way
 from sim_bridge.mavlink.vehicle import SimulatedMavlink
@@ -27,16 +28,16 @@ class Bench:
 
     def __init__(self, options: MavlinkOptions, context: LinkContext, key: bytes | None, unix_ns_at_zero: int) -> None:
         self._options = options
+        self.view = MocapView(options, context.rigid_body, context.seed)
         self.vehicle = SimulatedMavlink(
             context.vehicle,
             options,
-            position_m=context.initial_position_m,
-            yaw_rad=context.initial_yaw_rad,
+            position_m=self.view.true_place(context.initial_position_m),
+            yaw_rad=context.initial_yaw_rad + math.radians(options.mocap_yaw_deg),
             seed=context.seed,
             key=key,
             unix_ns_at_zero=unix_ns_at_zero,
         )
-        spoil(self.vehicle.parameters, options)
         if options.pilot_act not in (*self.vehicle.firmware.pilot.modes, "disarm"):
             modes = ", ".join(self.vehicle.firmware.pilot.modes)
             raise InputError(f"pilot_act={options.pilot_act}: a pilot of {options.flavour} can do disarm, {modes}")
@@ -51,7 +52,6 @@ class Bench:
     def switch_on(self, now_ns: int) -> None:
         """Begin to live at `now_ns`."""
         self.vehicle.switch_on(now_ns)
-        self._begin_boot()
 
     def receive(self, datagram: bytes, now_ns: int) -> None:
         """The client sends a datagram."""
@@ -75,6 +75,10 @@ class Bench:
             arrived.append(datagram[1])
         return arrived
 
+    def pose(self, now_ns: int) -> bytes | None:
+        """What motion capture publishes now; None: nothing."""
+        return self.view.frame(self.vehicle.body.state, self.vehicle.state_ns, now_ns, self.since_s(now_ns))
+
     def said(self) -> list[str]:
         """What a person at the bench sees happen, since the last time it was asked."""
         said, self._said = self._said, []
@@ -97,19 +101,11 @@ class Bench:
         o, vehicle = self._options, self.vehicle
         plan: list[tuple[float | None, str, Callable[[], None]]] = [
             (o.die_s, "all power lost", vehicle.die),
-            (o.reboot_s, "rebooted by itself", self._reboot),
+            (o.reboot_s, "rebooted by itself", vehicle.reboot),
             (o.low_battery_s, "cell nearly empty", lambda: vehicle.body.set_battery(LOW_V)),
             (o.pilot_s, "", lambda: self.act_as_pilot(o.pilot_act)),
         ]
         return [Timed(at_s, text, act) for at_s, text, act in plan if at_s is not None]
-
-    def _reboot(self) -> None:
-        self.vehicle.reboot()
-        self._begin_boot()
-
-    def _begin_boot(self) -> None:
-        if self._options.reject:
-            self.vehicle.firmware.rejected = frozenset({self._options.reject})
 
     def _send(self, now_ns: int) -> None:
         for datagram in self.vehicle.outgoing():

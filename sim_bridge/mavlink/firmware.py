@@ -54,8 +54,8 @@ class Firmware:
         """A key that came in SETUP_SIGNING; all zeros remove the one there is."""
         self.tells_param_errors = False
         """Whether it has PARAM_ERROR."""
-        self.rejected: frozenset[int] = frozenset()
-        """Commands that are denied, whatever they ask for: a fault."""
+        self.rejected = 0
+        """A command that is denied, whatever it asks for: a fault."""
         self._acts: dict[int, Callable[[Heard], None]] = {
             common.MAVLINK_MSG_ID_COMMAND_LONG: self._command_long,
             common.MAVLINK_MSG_ID_COMMAND_INT: self._command_int,
@@ -163,7 +163,7 @@ class Firmware:
 
     def _command(self, heard: Heard, params: tuple[float, ...]) -> None:
         command = heard.message.command
-        result = Result.DENIED if command in self.rejected else execute(command, params, self)
+        result = Result.DENIED if command and command == self.rejected else execute(command, params, self)
         self._answer(acknowledgement(command, result, heard.system, heard.component))
 
     def _set_mode(self, heard: Heard) -> None:

@@ -1,4 +1,4 @@
-"""How motion capture sees the vehicle: in our own axes (ENU), or in a frame that is z-up but not north-aligned."""
+"""How motion capture sees the vehicle: in our own axes, whose x is east or, where it was set up so, is not."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ class MocapView:
     def __init__(self, options: MavlinkOptions, rigid_body: str, seed: int) -> None:
         self._options = options
         self._camera = Camera(rigid_body, seed, options.noise_mm, options.noise_deg, twist=options.twist)
-        turned = math.radians(options.mocap_yaw_deg) if options.mocap_frame == "flu" else 0.0
-        self._q_WM = from_yaw(turned)
+        self._q_WM = from_yaw(math.radians(options.mocap_yaw_deg))
         self._frozen: State | None = None
 
     def frame(self, state: State, state_ns: int, now_ns: int, since_s: float | None) -> bytes | None:
@@ -33,8 +32,11 @@ class MocapView:
     def seen(self, state: State) -> State:
         """A state in the frame of motion capture."""
         back = conjugate(self._q_WM)
-        p: Vector3 = rotate(back, state.p_WB)
-        return State(p, rotate(back, state.v_WB_W), multiply(back, state.q_WB), state.w_WB_B)
+        return State(rotate(back, state.p_WB), rotate(back, state.v_WB_W), multiply(back, state.q_WB), state.w_WB_B)
+
+    def true_place(self, position_m: Vector3) -> Vector3:
+        """Where a place that is given in the frame of motion capture truly is."""
+        return rotate(self._q_WM, position_m)
 
     def _is_on(self, at_s: float | None, since_s: float | None) -> bool:
         if at_s is None or since_s is None:

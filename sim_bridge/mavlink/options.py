@@ -34,9 +34,8 @@ class MavlinkOptions(msgspec.Struct, frozen=True):
     unsigned: bool = False
     """Whether it takes unsigned packets although it has a key, as ArduPilot does on its first channel."""
 
-    mocap_frame: Literal["enu", "flu"] = "enu"
-    """`flu`: the published frame is turned by `mocap_yaw_deg`; its x is not east."""
     mocap_yaw_deg: Annotated[float, msgspec.Meta(ge=-360.0, le=360.0)] = 0.0
+    """Where the x axis of motion capture truly points, counter-clockwise from east: 0 makes it ENU, 90 x north."""
     noise_mm: Annotated[float, msgspec.Meta(ge=0.001, le=1000.0)] = 0.3
     """Standard deviation of the published position, each axis. Never zero: a camera without noise looks frozen."""
     noise_deg: Annotated[float, msgspec.Meta(ge=0.0, le=90.0)] = 0.1

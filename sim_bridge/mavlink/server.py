@@ -16,7 +16,6 @@ from lcd_flight.model import InputError, LinkContext
 from lcd_flight.wire.uri_options import read_options
 from sim_bridge.mavlink.bench import Bench
 from sim_bridge.mavlink.keys import key_of
-from sim_bridge.mavlink.mocap_view import MocapView
 from sim_bridge.mavlink.options import MavlinkOptions
 from sim_bridge.mavlink.ports import Port, TcpPort, UdpPort
 
@@ -48,7 +47,6 @@ class MavlinkServer:
         self._publish = context.publish_pose
         key = key_of(options.key_file)
         self._bench = Bench(options, context, key, time.time_ns() - context.clock.now_ns())
-        self._view = MocapView(options, context.rigid_body, context.seed)
         self._port: Port = TcpPort(host, port, self._receive) if kind == "tcp" else UdpPort(host, port, self._receive)
         self._name = f"{'PX4' if options.flavour == 'px4' else 'ArduCopter'} on a {context.vehicle.name}"
 
@@ -96,11 +94,8 @@ class MavlinkServer:
 
     def _show(self, now_ns: int) -> None:
         """Publish the pose, if anybody wants it."""
-        if self._publish is None:
-            return
-        vehicle = self._bench.vehicle
-        frame = self._view.frame(vehicle.body.state, vehicle.state_ns, now_ns, self._bench.since_s(now_ns))
-        if frame is not None:
+        frame = None if self._publish is None else self._bench.pose(now_ns)
+        if frame is not None and self._publish is not None:
             self._publish(frame)
 
     def _receive(self, datagram: bytes) -> None:

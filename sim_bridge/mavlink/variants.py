@@ -5,6 +5,7 @@ from __future__ import annotations
 from sim_bridge.mavlink.ardupilot import ArduPilot
 from sim_bridge.mavlink.autopilot import Autopilot, Setup
 from sim_bridge.mavlink.body import Body
+from sim_bridge.mavlink.faults import spoil
 from sim_bridge.mavlink.options import Flavour, MavlinkOptions
 from sim_bridge.mavlink.parameter_tables import ARDUPILOT, ARDUPILOT_READY, PX4, PX4_READY
 from sim_bridge.mavlink.parameters import Bytewise, Cast, Parameters
@@ -27,6 +28,7 @@ def parameters_of(options: MavlinkOptions) -> Parameters:
     else:
         parameters = Parameters(ARDUPILOT, Cast, ARDUPILOT_READY if ready else {})
         parameters.put("SYSID_THISMAV", options.system)
+    spoil(parameters, options)
     return parameters
 
 

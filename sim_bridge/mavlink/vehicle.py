@@ -110,6 +110,7 @@ class SimulatedMavlink:
         pilot = boot(self.options, self.body, self.parameters, self._time_ns)
         firmware = Firmware(pilot, self.parameters, self.options.system, self._unix_ns)
         firmware.tells_param_errors = self.options.param_error
+        firmware.rejected = self.options.reject
         return firmware
 
     def _change_key(self) -> None:

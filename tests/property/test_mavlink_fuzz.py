@@ -1,4 +1,4 @@
-"""Whatever a client sends, the simulated MAVLink vehicle lives on and takes no more memory (a million: `make campaign`)."""
+"""Whatever a client sends, the simulated MAVLink vehicle lives on and takes no more memory (more: `make campaign`)."""
 
 from __future__ import annotations
 

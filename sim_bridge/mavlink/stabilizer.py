@@ -17,7 +17,7 @@ from sim_bridge.mavlink.frames import Hamilton, inverse, product, turn, unit
 
 HEADING_WEIGHT = 0.4
 RATE_GAIN = 25.0
-"""1/s, from an error of body rates to angular acceleration."""
+"""1/s, from an error of body rates to angular acceleration; less where the rotors follow slowly."""
 LARGEST_RATES = (3.84, 3.84, 3.49)
 """rad/s (MC_ROLLRATE_MAX 220, MC_YAWRATE_MAX 200 deg/s)."""
 HEADING_SHARE = 0.3
@@ -38,6 +38,7 @@ class Stabilizer:
     def __init__(self, vehicle: Vehicle) -> None:
         self._k_eta, self._most_N = vehicle.k_eta, 0.25 * vehicle.max_thrust_N
         self._inertia = vehicle.inertia_kg_m2
+        self._rate_gain = min(RATE_GAIN, 1.0 / vehicle.motor_time_constant_s)
         self._arm_m = vehicle.k_m / vehicle.k_eta
         right = [-y for _, y, _ in vehicle.rotor_positions_m]
         forward = [x for x, _, _ in vehicle.rotor_positions_m]
@@ -48,7 +49,7 @@ class Stabilizer:
     def speeds(self, wanted: Hamilton, force_N: float, q: Hamilton, rates: Vector3, gains: Gains) -> Speeds:
         """Rotor speeds in rad/s that turn `q` to `wanted` with this collective force."""
         goal = wanted_rates(wanted, q, gains)
-        turns = (RATE_GAIN * (g - w) * j for g, w, j in zip(goal, rates, self._inertia, strict=True))
+        turns = (self._rate_gain * (g - w) * j for g, w, j in zip(goal, rates, self._inertia, strict=True))
         roll, pitch, yaw = turns
         most = HEADING_SHARE * force_N * self._arm_m
         return self._mixed((force_N, roll, pitch, _within(yaw, most)))

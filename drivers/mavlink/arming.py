@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers.mavlink.autopilot import Autopilot
@@ -79,10 +80,12 @@ async def arm(controls: Controls) -> None:
     raise RefusedError(f"the autopilot will not arm: {controls.reason(result)}")
 
 
-async def disarm(controls: Controls, *, flown: bool) -> None:
+async def disarm(controls: Controls, may: Callable[[], bool], *, flown: bool) -> None:
     """Disarm on the ground: after a flight by its own LAND mode, else by order; by force where neither helps.
 
     ArduPilot does not reliably see a touchdown on no thrust, and then refuses an ordinary disarm for seconds.
+
+    may: asked before each order: whether it still stands on the ground, and nobody else flies it.
 
     Raises:
         RefusedError: it stays armed.
@@ -91,6 +94,8 @@ async def disarm(controls: Controls, *, flown: bool) -> None:
     if flown and await _lands(controls):
         return
     for forced in (0.0, FORCED):
+        if not may():
+            return
         result = await controls.commands.ask(_ARM, 0.0, forced)
         if await until(clock, lambda: picture.armed is False, CONFIRM_S):
             return

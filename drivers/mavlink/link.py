@@ -17,10 +17,11 @@ from typing import Self
 from drivers.mavlink import arming, options, setpoint_wire
 from drivers.mavlink.arming import Controls
 from drivers.mavlink.connection import Connection
-from drivers.mavlink.dialect import Message, mavlink
-from drivers.mavlink.outbox import FALLBACK_NS, Mode, Outbox
+from drivers.mavlink.contact import Contact
+from drivers.mavlink.custody import Custody
+from drivers.mavlink.outbox import FALLBACK_NS, Outbox
 from drivers.mavlink.thrust import ThrustMap
-from drivers.mavlink.transport import SerialPort, Tcp, Transport, Udp
+from drivers.mavlink.transport import Transport, transport_to
 from drivers.mavlink.waiting import pause, until
 from lcd_flight.model import AttitudeThrust, LinkContext, LinkReport, Quaternion, RefusedError, Transmission
 from lcd_flight.model.frames import from_yaw, yaw_of
@@ -33,6 +34,8 @@ STOP_S = 1.0
 """So long closing goes on repeating an emergency stop that is not confirmed."""
 FLYING_M = 0.15
 """Above where it stood: higher is in the air."""
+HOVERS = (0.05, 0.9)
+"""Shares of full thrust that a vehicle may hover at."""
 LOG_CAPACITY = 1000
 TEND_NS = 10_000_000
 
@@ -44,8 +47,7 @@ def open_udp(address: str, given: Mapping[str, str], context: LinkContext) -> Ma
         InputError: not an address, a wrong option, or no signing key where it should be.
         RefusedError: others may read the signing key.
     """
-    chosen = options.read("mavlink+udp", address, given)
-    return MavlinkLink(f"mavlink+udp://{address}", chosen, context, udp(address, chosen))
+    return _opened("mavlink+udp", address, given, context)
 
 
 def open_tcp(address: str, given: Mapping[str, str], context: LinkContext) -> MavlinkLink:
@@ -55,8 +57,7 @@ def open_tcp(address: str, given: Mapping[str, str], context: LinkContext) -> Ma
         InputError: as `open_udp`.
         RefusedError: as `open_udp`.
     """
-    chosen = options.read("mavlink+tcp", address, given)
-    return MavlinkLink(f"mavlink+tcp://{address}", chosen, context, tcp(address, chosen))
+    return _opened("mavlink+tcp", address, given, context)
 
 
 def open_serial(address: str, given: Mapping[str, str], context: LinkContext) -> MavlinkLink:
@@ -66,20 +67,12 @@ def open_serial(address: str, given: Mapping[str, str], context: LinkContext) ->
         InputError: as `open_udp`.
         RefusedError: as `open_udp`.
     """
-    chosen = options.read("mavlink+serial", address, given)
-    return MavlinkLink(f"mavlink+serial://{address}", chosen, context, SerialPort(address, chosen.baud))
+    return _opened("mavlink+serial", address, given, context)
 
 
-def udp(address: str, chosen: options.MavlinkOptions) -> Udp:
-    """The transport of an address that has been read."""
-    host, _, port = address.rpartition(":")
-    return Udp(host, int(port), call=chosen.role == "call")
-
-
-def tcp(address: str, chosen: options.MavlinkOptions) -> Tcp:
-    """The transport of an address that has been read."""
-    host, _, port = address.rpartition(":")
-    return Tcp(host, int(port), chosen.connect_s)
+def _opened(scheme: str, address: str, given: Mapping[str, str], context: LinkContext) -> MavlinkLink:
+    chosen = options.read(scheme, address, given)
+    return MavlinkLink(f"{scheme}://{address}", chosen, context, transport_to(scheme, address, chosen))
 
 
 class MavlinkLink:
@@ -87,44 +80,45 @@ class MavlinkLink:
 
     def __init__(self, uri: str, chosen: options.MavlinkOptions, context: LinkContext, transport: Transport) -> None:
         """See the openers above; `transport` may be anything that carries bytes."""
-        self._connection = Connection(uri, chosen, context, transport)
         self._options, self._context, self._clock = chosen, context, context.clock
+        self._contact = contact = Contact(uri, chosen, context.clock, transport)
+        self._connection = Connection(contact, context)
+        self._controls = Controls(contact.autopilot, contact.commands, contact.picture, context.clock)
         self._outbox = Outbox()
+        self._custody = Custody(contact, self._outbox, self._airborne)
         self._map: ThrustMap | None = None
         self._tending: asyncio.Task[None] | None = None
-        self._taken_over = self._unfit = ""
-        self._fell_back = self._lost = self._flown = False
-        self._restarts = 0
-        self._sent = self._invalid = 0
+        self._fell_back = False
+        self._restarts = self._sent = self._invalid = 0
         self._transmitted: deque[Transmission] = deque(maxlen=LOG_CAPACITY)
 
     async def __aenter__(self) -> Self:
-        """Find the vehicle and set it up; see `Connection`.
+        """Find the vehicle and set it up; see `Contact` and `Connection`.
 
         Raises:
             RefusedError: it is not there, not set up, or does not know where it is; with all that is wrong.
         """
-        connection = self._connection
-        connection.session.listen(self._watch)
+        picture = self._contact.picture
+        self._contact.session.listen(self._custody.watch)
         try:
             self._tending = asyncio.create_task(self._tend())
-            await connection.find()
-            await connection.set_up()
+            await self._contact.find()
+            await self._connection.set_up()
             self._map = self._thrust_map()
         except BaseException:
             await self._close()
             raise
-        self._restarts = connection.picture.restarts
-        connection.picture.say(self.description)
-        for change in connection.changed:
-            connection.picture.say(f"parameter {change}")
+        self._restarts = picture.restarts
+        picture.say(self.description)
+        for change in self._connection.changed:
+            picture.say(f"parameter {change}")
         return self
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Leave a vehicle in the air to its own LAND mode and its poses until it is down; then close."""
-        picture = self._connection.picture
+        picture = self._contact.picture
         try:
             if self._outbox.latched:
                 await until(self._clock, lambda: picture.armed is False, STOP_S)
@@ -136,34 +130,33 @@ class MavlinkLink:
     @property
     def description(self) -> str:
         """Autopilot, version, and what hovering takes."""
-        version = self._connection.picture.version or "of unknown version"
+        version = self._contact.picture.version or "of unknown version"
         thrust = "" if self._map is None else f"; {self._map.described()}"
-        return f"{self._connection.autopilot.name} {version}{thrust}"
+        return f"{self._contact.autopilot.name} {version}{thrust}"
 
     async def arm(self) -> None:
-        """Stream, enter the autopilot's mode, arm, and wait until its motors take thrust. Takes 4 to 9 s.
+        """Stream, enter the autopilot's mode, arm, and wait until its motors take thrust. Takes 3 to 9 s.
 
         Raises:
             RefusedError: not connected, motors stopped or handed over before, or the vehicle will not, with its reason.
         """
         self._require_fit()
-        picture, mode = self._connection.picture, self._connection.autopilot.flight_mode
-        self._flown = self._lost = False
+        mode = self._contact.autopilot.flight_mode
+        self._custody.begin()
         self._outbox.idle(self._clock.now_ns())
         try:
             await pause(self._clock, STREAM_S)
             await arming.enter_mode(self._controls, mode)
             await arming.arm(self._controls)
-            await pause(self._clock, self._connection.autopilot.spool_up_s)
-            if picture.custom_mode != mode or not picture.armed or self._outbox.mode is not Mode.IDLING:
-                raise RefusedError(f"the vehicle was armed, but is in mode {self._mode_name()} now: {self._said()}")
+            await pause(self._clock, self._contact.autopilot.spool_up_s)
+            self._custody.require_armed_in(mode, self._clock.now_ns())
         except BaseException:
             self._outbox.rest(self._clock.now_ns())
             raise
         self._outbox.ready(self._clock.now_ns())
 
     async def disarm(self) -> None:
-        """Make a vehicle on the ground disarm; one that flew, by its LAND mode.
+        """Make a vehicle on the ground disarm; one that flew, by its LAND mode. Nothing where somebody else has it.
 
         Raises:
             RefusedError: not connected, or it stays armed.
@@ -172,26 +165,29 @@ class MavlinkLink:
             raise RefusedError("the vehicle cannot be disarmed: the link is not open")
         if self._outbox.over:
             return
-        now_ns = self._clock.now_ns()
-        if self._connection.picture.armed:
-            self._outbox.idle(now_ns)
-            await arming.disarm(self._controls, flown=self._flown)
+        if self._contact.picture.armed:
+            flown = self._custody.landing = self._custody.flown
+            self._outbox.idle(self._clock.now_ns())
+            await arming.disarm(self._controls, self._custody.may_be_cut, flown=flown)
         self._outbox.rest(self._clock.now_ns())
 
     def send(self, setpoint: AttitudeThrust, stamp_ns: int) -> None:
         """Send the setpoint of the tick that began at `stamp_ns`, at once; an unfit one is refused and counted."""
-        now_ns = self._clock.now_ns()
         if self._map is None or self._tending is None:
             return
         if not setpoint.is_finite():
             self._invalid += 1
             return
-        if self._outbox.admits(stamp_ns, now_ns) and self._transmit(setpoint.q_WB, self._map.share(setpoint.thrust_N)):
+        thrust = self._map.share(setpoint.thrust_N)
+        if self._outbox.admits(stamp_ns, self._clock.now_ns()) and self._transmit(setpoint.q_WB, thrust):
             self._sent += 1
-            self._flown = True
+            self._custody.flown = True
 
     def stop_motors(self) -> None:
-        """Emergency stop, latched: a forced disarm, repeated until the vehicle says that it is disarmed."""
+        """Emergency stop, latched: a forced disarm, repeated until the vehicle says that it is disarmed.
+
+        Not of a vehicle that somebody else flies.
+        """
         if self._tending is None or self._outbox.latched:
             return
         self._outbox.stop(self._clock.now_ns())
@@ -199,7 +195,7 @@ class MavlinkLink:
 
     def report(self, now_ns: int) -> LinkReport:
         """What is known now."""
-        session, picture = self._connection.session, self._connection.picture
+        session, picture = self._contact.session, self._contact.picture
         falls_back = self._outbox.falls_back(now_ns)
         if falls_back and not self._fell_back:
             picture.say(f"no fresh setpoint for {FALLBACK_NS / 1e6:.0f} ms: silence, the autopilot's own failsafe acts")
@@ -215,25 +211,20 @@ class MavlinkLink:
             stale=self._outbox.stale + self._invalid,
             loss_share=session.losses.share(now_ns),
             fallback_active=falls_back,
+            taken_over=self._custody.taken_over,
             transmitted=transmitted,
-            telemetry=picture.telemetry(now_ns=now_ns, lost=self._lost),
+            telemetry=picture.telemetry(now_ns=now_ns, lost=self._custody.lost),
         )
-
-    @property
-    def _controls(self) -> Controls:
-        connection = self._connection
-        return Controls(connection.autopilot, connection.commands, connection.picture, self._clock)
 
     def _require_fit(self) -> None:
         """Refuse to arm what cannot be armed on this connection any more, or not now."""
-        reason = ""
         if self._tending is None:
             reason = "the link is not open"
         elif self._outbox.latched:
             reason = "its motors were stopped; connect anew"
-        elif self._taken_over:
-            reason = f"{self._taken_over}; connect anew"
-        elif self._connection.picture.restarts != self._restarts:
+        elif self._outbox.over:
+            reason = f"{self._custody.taken_over or 'it was disarmed in the air'}; connect anew"
+        elif self._contact.picture.restarts != self._restarts:
             reason = "the autopilot was restarted since it was set up; connect anew"
         else:
             reason = self._connection.objection()
@@ -241,20 +232,19 @@ class MavlinkLink:
             raise RefusedError(f"the vehicle will not arm: {reason}")
 
     def _thrust_map(self) -> ThrustMap:
-        autopilot, given = self._connection.autopilot, self._options
-        hover = given.hover
-        if hover is None:
-            hover = self._connection.parameters.values.get(autopilot.hover_parameter)
-        if hover is None or not 0.05 <= hover <= 0.9:
-            raise RefusedError(f"{autopilot.hover_parameter} is {hover}, no share of thrust to hover at (0.05 to 0.9): "
-                               "set it, or give the option hover")  # fmt: skip
+        autopilot, given = self._contact.autopilot, self._options
+        hover = self._contact.parameters.values.get(autopilot.hover_parameter) if given.hover is None else given.hover
+        if hover is None or not HOVERS[0] <= hover <= HOVERS[1]:
+            raise RefusedError(
+                f"{autopilot.hover_parameter} is {hover}, no share of thrust to hover at ({HOVERS[0]} to {HOVERS[1]}): "
+                "set it, or give the option hover"
+            )
         slope = autopilot.thrust_slope if given.thrust_slope is None else given.thrust_slope
         return ThrustMap(hover, slope, self._context.vehicle.weight_N)
 
     def _transmit(self, q_WB: Quaternion, thrust: float) -> bool:
         """Validate, encode and send one setpoint, and note its bytes; whether it went."""
-        now_ns = self._clock.now_ns()
-        session = self._connection.session
+        now_ns, session = self._clock.now_ns(), self._contact.session
         try:
             message = setpoint_wire.attitude_target(
                 q_WB, thrust, now_ns=now_ns, target=session.vehicle, frame=self._options.frame
@@ -272,7 +262,7 @@ class MavlinkLink:
         """Everything that is due without being asked for, at the control rate."""
         while True:
             now_ns = self._clock.now_ns()
-            self._connection.tend(now_ns)
+            self._contact.tend(now_ns)
             self._due(now_ns)
             await self._clock.sleep_until(now_ns + TEND_NS)
 
@@ -287,55 +277,22 @@ class MavlinkLink:
         pose = self._connection.pose
         return from_yaw(0.0 if pose is None else yaw_of(pose.q_WB))
 
-    def _watch(self, message: Message, now_ns: int) -> None:
-        """Notice, at each heartbeat, that somebody else flies or that the motors are off."""
-        if message.get_msgId() != mavlink.MAVLINK_MSG_ID_HEARTBEAT:
-            return
-        picture, mode = self._connection.picture, self._outbox.mode
-        if picture.armed is False:
-            self._outbox.confirm_off() if self._outbox.latched else self._note_disarmed()
-        elif mode in (Mode.READY, Mode.FLYING) and picture.custom_mode != self._connection.autopilot.flight_mode:
-            self._hand_over(now_ns)
-
-    def _note_disarmed(self) -> None:
-        """In flight, that is out of our hands."""
-        if self._outbox.mode is Mode.FLYING and self._airborne():
-            self._lost = True
-            self._outbox.hand_over(self._clock.now_ns())
-            self._connection.picture.say(f"the vehicle was disarmed in the air, not by us{self._quoted()}")
-
-    def _hand_over(self, now_ns: int) -> None:
-        alone = self._connection.picture.failsafe or self._outbox.falls_back(now_ns)
-        who = "the autopilot's failsafe" if alone else "the pilot"
-        self._taken_over = f"{who} took over: mode {self._mode_name()}"
-        self._outbox.hand_over(now_ns)
-        self._connection.picture.say(f"{self._taken_over}{self._quoted()}")
-
     def _airborne(self) -> bool:
+        """By motion capture: the autopilot's own word comes late."""
         pose = self._connection.pose
         return pose is not None and pose.p_WB[2] > self._context.initial_position_m[2] + FLYING_M
 
-    def _mode_name(self) -> str:
-        mode = self._connection.picture.custom_mode
-        return "unknown" if mode is None else self._connection.autopilot.mode_name(mode)
-
-    def _said(self) -> str:
-        return self._connection.picture.texts.recent(self._clock.now_ns()) or "it does not say why"
-
-    def _quoted(self) -> str:
-        texts = self._connection.picture.texts.recent(self._clock.now_ns())
-        return f"; the autopilot says {texts}" if texts else ""
-
     async def _leave(self) -> None:
         """Have a vehicle that is still armed land by itself, or disarm where it stands."""
-        picture = self._connection.picture
+        picture = self._contact.picture
         if not self._airborne():
             with contextlib.suppress(RefusedError):
                 await self.disarm()
             return
+        self._custody.landing = True
         self._outbox.land(self._clock.now_ns())
         if await arming.land(self._controls):
-            await until(self._clock, lambda: picture.armed is False, DESCENT_S)
+            await until(self._clock, lambda: picture.armed is False or self._outbox.over, DESCENT_S)
 
     async def _close(self) -> None:
         """Stop tending and close; no task is left."""
@@ -345,3 +302,4 @@ class MavlinkLink:
             tending.cancel()
             await asyncio.gather(tending, return_exceptions=True)
         self._connection.close()
+        self._contact.close()

@@ -118,8 +118,8 @@ class Outbox:
         self._enter(Mode.HANDED_OVER, now_ns)
 
     def stop(self, now_ns: int) -> None:
-        """Emergency stop; the operator's word holds after a hand-over too."""
-        self.mode, self._since_ns, self._next_ns, self._off = Mode.STOPPED, now_ns, now_ns, False
+        """Emergency stop, for good. Not of a vehicle that somebody else flies."""
+        self._enter(Mode.STOPPED, now_ns)
 
     def _enter(self, mode: Mode, now_ns: int) -> None:
         if self.over or self.mode is mode:

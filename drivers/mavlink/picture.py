@@ -43,6 +43,8 @@ class Picture:
         """Whether its state is critical or worse."""
         self.terminated = False
         self.airborne: bool | None = None
+        self.heard_status = False
+        """Whether SYS_STATUS has come."""
         self.battery_V: float | None = None
         self.q_WB: Quaternion | None = None
         self.q_ns: int | None = None
@@ -115,6 +117,7 @@ class Picture:
         self.terminated = message.system_status in _OUT_OF_HANDS
 
     def _take_status(self, message: Message, _arrival_ns: int) -> None:
+        self.heard_status = True
         if 0 < message.voltage_battery < _NOT_SENT:
             self.battery_V = message.voltage_battery * 1e-3
         if message.onboard_control_sensors_present & _PREARM:

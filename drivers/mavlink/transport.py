@@ -9,6 +9,7 @@ import socket
 from collections.abc import Callable
 from typing import Any, Protocol, TypeAlias
 
+from drivers.mavlink.options import MavlinkOptions
 from lcd_flight.model import RefusedError
 
 Peer: TypeAlias = tuple[str, int]
@@ -45,6 +46,16 @@ class Transport(Protocol):
     def close(self) -> None:
         """Give everything back; may be called at any time."""
         ...
+
+
+def transport_to(scheme: str, address: str, options: MavlinkOptions) -> Transport:
+    """What carries bytes to an address that has been read (`options.read`)."""
+    if scheme == "mavlink+serial":
+        return SerialPort(address, options.baud)
+    host, _, port = address.rpartition(":")
+    if scheme == "mavlink+tcp":
+        return Tcp(host, int(port), options.connect_s)
+    return Udp(host, int(port), call=options.role == "call")
 
 
 class Udp:

@@ -86,7 +86,7 @@ Progress = Callable[[Connected | Checked | ByHand | Flying], None]
 
 
 class Reporter:
-    """The observer behind `Flying`: reports at each change of phase or leg, each new finding or message, and at 10 Hz."""
+    """The observer behind `Flying`: reports each change of phase or leg, each new finding or message, and at 10 Hz."""
 
     def __init__(self, setup: FlightSetup, progress: Progress) -> None:
         self._setup, self._progress = setup, progress

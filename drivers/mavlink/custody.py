@@ -1,0 +1,81 @@
+"""Who has the vehicle: we do from the moment it is armed in our mode, until a heartbeat shows that somebody else does.
+
+A pilot's remote control wins always. Who changes the mode is the pilot, a ground station or the autopilot's failsafe:
+from then on nothing is sent, and the mode is never entered again on this connection.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from drivers.mavlink.contact import Contact
+from drivers.mavlink.dialect import Message, mavlink
+from drivers.mavlink.outbox import Mode, Outbox
+from lcd_flight.model import RefusedError
+
+
+class Custody:
+    """Watches the heartbeats."""
+
+    def __init__(self, contact: Contact, outbox: Outbox, airborne: Callable[[], bool]) -> None:
+        """airborne: whether motion capture sees it above the ground."""
+        self.taken_over = ""
+        """Who flies in our place, and in which mode; empty while nobody does."""
+        self.lost = False
+        """Whether it was disarmed in the air, not by us."""
+        self.flown = self.landing = False
+        """Whether a setpoint has gone out since arming; whether it was told to land by itself."""
+        self._contact, self._outbox, self._airborne = contact, outbox, airborne
+
+    def begin(self) -> None:
+        """It is going to be armed."""
+        self.lost = self.flown = self.landing = False
+
+    def watch(self, message: Message, now_ns: int) -> None:
+        """Look at each heartbeat."""
+        if message.get_msgId() != mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+            return
+        if self._contact.picture.armed is False:
+            self._note_disarmed(now_ns)
+        elif not self._is_in_expected_mode():
+            self._hand_over(now_ns)
+
+    def may_be_cut(self) -> bool:
+        """Whether its motors may be stopped by force: on the ground, and nobody else flies it."""
+        return not self._outbox.over and not self._airborne()
+
+    def require_armed_in(self, mode: int, now_ns: int) -> None:
+        """Refuse to go on where the mode was changed, or it was disarmed, while the motors came up.
+
+        Raises:
+            RefusedError: so it is.
+        """
+        picture, said = self._contact.picture, self._contact.said()
+        if picture.armed and picture.custom_mode != mode:
+            self._hand_over(now_ns)
+            raise RefusedError(f"{self.taken_over}{said}")
+        if not picture.armed or self._outbox.mode is not Mode.IDLING:
+            raise RefusedError(f"the vehicle was armed and is not any more{said}")
+
+    def _is_in_expected_mode(self) -> bool:
+        """Whether the mode is one that we asked for; before anything flies it may be any."""
+        autopilot, mode = self._contact.autopilot, self._contact.picture.custom_mode
+        if self.landing and not self._outbox.over:
+            return mode in (autopilot.flight_mode, autopilot.land_mode)
+        return mode == autopilot.flight_mode or self._outbox.mode not in (Mode.READY, Mode.FLYING)
+
+    def _note_disarmed(self, now_ns: int) -> None:
+        if self._outbox.latched:
+            self._outbox.confirm_off()
+        elif self._outbox.mode is Mode.FLYING and self._airborne():
+            self.lost = True
+            self._outbox.hand_over(now_ns)
+            self._contact.picture.say(f"the vehicle was disarmed in the air, not by us{self._contact.said()}")
+
+    def _hand_over(self, now_ns: int) -> None:
+        picture, autopilot = self._contact.picture, self._contact.autopilot
+        alone = picture.failsafe or self._outbox.falls_back(now_ns)
+        mode = "unknown" if picture.custom_mode is None else autopilot.mode_name(picture.custom_mode)
+        self.taken_over = f"{'the autopilot by itself' if alone else 'the pilot'} took over: mode {mode}"
+        self._outbox.hand_over(now_ns)
+        picture.say(f"{self.taken_over}{self._contact.said()}")

@@ -1,4 +1,4 @@
-"""The MAVLink link and a simulated vehicle in virtual time: bytes between them in memory, motion capture beside them."""
+"""The MAVLink link and a simulated vehicle in virtual time: bytes in memory, motion capture beside them."""
 
 from __future__ import annotations
 
@@ -8,35 +8,55 @@ import itertools
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field, replace
 
+import short_mission
+from short_mission import Listener
+
 from drivers.mavlink import options
 from drivers.mavlink.link import MavlinkLink
 from drivers.mavlink.transport import Peer, Receiver
 from lcd_flight import plugins
 from lcd_flight.flight import virtual_time
+from lcd_flight.flight.loop import FlightLoop
+from lcd_flight.flight.operator import Operator
+from lcd_flight.flight.result import Story
+from lcd_flight.flight.session import FlightOptions, _flown
 from lcd_flight.flight.virtual_time import VirtualClock
-from lcd_flight.model import AttitudeThrust, LinkContext, LinkReport, PoseSource, Quaternion, RawPose, Vector3, Vehicle
-from lcd_flight.model.frames import from_yaw
-from lcd_flight.worlds import load_vehicle
+from lcd_flight.model import (
+    AttitudeThrust,
+    LinkContext,
+    LinkReport,
+    Outcome,
+    PoseSource,
+    State,
+    Tick,
+    TickInputs,
+    Vector3,
+    Vehicle,
+)
+from lcd_flight.model.frames import from_yaw, multiply, rotate
 from sim_bridge.camera import Camera
 from sim_bridge.mavlink.options import MavlinkOptions as VehicleOptions
 from sim_bridge.mavlink.vehicle import SimulatedMavlink
 
 MS = 1_000_000
 CLOCK = VirtualClock()
-VEHICLE: Vehicle = load_vehicle("hummingbird")
-START_M: Vector3 = (0.5, -0.3, 0.0)
-START_YAW_RAD = 0.4
+VEHICLE: Vehicle = short_mission.vehicle()
 STEP_NS = 2 * MS
 FRAME_STEPS = 5
 PEER: Peer = ("127.0.0.1", 14580)
 
 Tampers = Callable[[bytes, bool, int], "list[bytes]"]
-"""What becomes of a datagram: itself, nothing, several; True for the way up, to the vehicle; at a time."""
+"""What becomes of a datagram: itself, nothing, several; True for the way up, to the vehicle; and when."""
 _names = itertools.count()
 
 
-def _as_it_is(data: bytes, _up: bool, _now_ns: int) -> list[bytes]:
+def as_it_is(data: bytes, _up: bool, _now_ns: int) -> list[bytes]:
     return [data]
+
+
+def kind_of(data: bytes) -> int:
+    """Message id of a MAVLink 2 packet."""
+    return int.from_bytes(data[7:10], "little")
 
 
 @dataclass
@@ -46,10 +66,9 @@ class Air:
     vehicle: SimulatedMavlink
     stream: bool = False
     faults: int = 0
-    tampers: Tampers = _as_it_is
+    tampers: Tampers = as_it_is
     ups: list[tuple[int, bytes]] = field(default_factory=list)
     """Every datagram that was sent to the vehicle, and when."""
-    peer: Peer = PEER
     receive: Receiver | None = None
 
     async def open(self, receive: Receiver) -> None:
@@ -67,10 +86,10 @@ class Air:
     def close(self) -> None:
         self.receive = None
 
-    def deliver(self, data: bytes, peer: Peer | None = None) -> None:
+    def deliver(self, data: bytes, peer: Peer = PEER) -> None:
         """Let the link hear something."""
         if self.receive is not None:
-            self.receive(data, peer or self.peer)
+            self.receive(data, peer)
 
     def step(self, now_ns: int) -> None:
         """Let the vehicle live, and the link hear it."""
@@ -78,6 +97,10 @@ class Air:
         for data in self.vehicle.outgoing():
             for arriving in self.tampers(data, False, now_ns):
                 self.deliver(arriving)
+
+    def sent(self, kind: int, since_ns: int = 0) -> list[tuple[int, bytes]]:
+        """What the link sent of one kind of message."""
+        return [(at_ns, data) for at_ns, data in self.ups if kind_of(data) == kind and at_ns >= since_ns]
 
 
 @dataclass
@@ -88,18 +111,28 @@ class Bench:
     pose: PoseSource
     context: LinkContext
     flavour: str
+    mocap_yaw_rad: float
     shows: bool = True
     """Whether motion capture publishes."""
-    seen: RawPose | None = None
 
     @property
     def vehicle(self) -> SimulatedMavlink:
         return self.air.vehicle
 
     @property
-    def p_WB(self) -> Vector3:
-        """Where it truly is."""
-        return self.vehicle.body.state.p_WB
+    def state(self) -> State:
+        """Where it truly is, in motion capture's frame."""
+        true, turn = self.vehicle.body.state, from_yaw(-self.mocap_yaw_rad)
+        return replace(
+            true,
+            p_WB=rotate(turn, true.p_WB),
+            v_WB_W=rotate(turn, true.v_WB_W),
+            q_WB=multiply(turn, true.q_WB),
+        )
+
+    @property
+    def height_m(self) -> float:
+        return self.vehicle.body.state.p_WB[2]
 
     @property
     def mode(self) -> int:
@@ -114,14 +147,28 @@ class Bench:
         """The link to it; `given` as in a URI."""
         pairs = dict(pair.split("=", 1) for pair in given.split("&") if pair)
         chosen = options.read("mavlink+udp", "127.0.0.1:14540", {"autopilot": self.flavour, **pairs})
-        return MavlinkLink("mavlink+udp://127.0.0.1:14540", chosen, replace(self.context, **changes), self.air)
+        context = replace(self.context, **changes)  # type: ignore[arg-type]
+        return MavlinkLink("mavlink+udp://127.0.0.1:14540", chosen, context, self.air)
 
 
 @contextlib.asynccontextmanager
-async def bench(flavour: str = "px4", *, tampers: Tampers = _as_it_is, **given: object) -> AsyncIterator[Bench]:
-    """A vehicle that was switched on a minute ago; options as the simulated vehicle has them."""
-    wanted = VehicleOptions(**{"flavour": flavour, "boot_s": 0.0, **given})  # type: ignore[arg-type]
-    vehicle = SimulatedMavlink(VEHICLE, wanted, position_m=START_M, yaw_rad=START_YAW_RAD, seed=3)
+async def bench(
+    flavour: str = "px4",
+    *,
+    tampers: Tampers = as_it_is,
+    key: bytes | None = None,
+    mocap_yaw_rad: float = 0.0,
+    start_m: Vector3 = (0.0, 0.0, 0.0),
+    yaw_rad: float = 0.0,
+    age_s: float = 30.0,
+    **given: object,
+) -> AsyncIterator[Bench]:
+    """A vehicle that was switched on a while ago; other options as the simulated vehicle has them.
+
+    start_m, yaw_rad: in the true world, from which motion capture's is turned by `mocap_yaw_rad`.
+    """
+    wanted = VehicleOptions(**{"flavour": flavour, **given})  # type: ignore[arg-type]
+    vehicle = SimulatedMavlink(VEHICLE, wanted, position_m=start_m, yaw_rad=yaw_rad, seed=3, key=key)
     vehicle.switch_on(CLOCK.now_ns())
     air = Air(vehicle, tampers=tampers)
     endpoint = f"loopback://mavlink-{next(_names)}"
@@ -129,15 +176,17 @@ async def bench(flavour: str = "px4", *, tampers: Tampers = _as_it_is, **given: 
     camera = Camera("body", 3, 0.3, 0.1, twist=False)
     try:
         async with plugins.pose_source(endpoint, "body", CLOCK) as pose:
-            context = LinkContext(VEHICLE, CLOCK, START_M, START_YAW_RAD, seed=3, listen_poses=pose.listen)
-            made = Bench(air, pose, context, flavour)
+            context = LinkContext(VEHICLE, CLOCK, start_m, yaw_rad, seed=3, listen_poses=pose.listen)
+            made = Bench(air, pose, context, flavour, mocap_yaw_rad)
+            if age_s:
+                await wait_s(age_s)
 
             async def live() -> None:
                 for step in itertools.count():
                     now_ns = CLOCK.now_ns()
                     air.step(now_ns)
                     if step % FRAME_STEPS == 0 and made.shows:
-                        publisher(camera.frame(vehicle.body.state, now_ns, now_ns))
+                        publisher(camera.frame(made.state, now_ns, now_ns))
                     await CLOCK.sleep_until(now_ns + STEP_NS)
 
             living = asyncio.create_task(live())
@@ -166,12 +215,8 @@ async def wait_s(seconds: float) -> None:
     await CLOCK.sleep_until(CLOCK.now_ns() + round(seconds * 1e9))
 
 
-def level(share_of_weight: float, yaw_rad: float = START_YAW_RAD) -> AttitudeThrust:
+def level(share_of_weight: float, yaw_rad: float = 0.0) -> AttitudeThrust:
     return AttitudeThrust(share_of_weight * VEHICLE.weight_N, from_yaw(yaw_rad))
-
-
-def tilted(q_WB: Quaternion, share_of_weight: float = 1.0) -> AttitudeThrust:
-    return AttitudeThrust(share_of_weight * VEHICLE.weight_N, q_WB)
 
 
 async def stream(link: MavlinkLink, setpoint: AttitudeThrust, seconds: float) -> LinkReport:
@@ -181,3 +226,33 @@ async def stream(link: MavlinkLink, setpoint: AttitudeThrust, seconds: float) ->
         link.send(setpoint, CLOCK.now_ns())
         await wait_s(0.01)
     return report
+
+
+@dataclass
+class Flown:
+    """How a flight went."""
+
+    outcome: Outcome
+    reason: str
+    listener: Listener
+
+    @property
+    def told(self) -> str:
+        """All that the vehicle and its link said."""
+        reports = (inputs.link.telemetry for inputs, _ in self.listener.flight)
+        return "\n".join(text for telemetry in reports if telemetry is not None for text in telemetry.messages)
+
+    def first(self, code: str) -> TickInputs:
+        """The inputs of the tick that had a finding first."""
+        return next(i for i, t in self.listener.flight if any(f.code == code for f in t.findings))
+
+
+async def flight(
+    made: Bench, given: str = "", act: Callable[[TickInputs, Tick], None] = lambda _inputs, _tick: None
+) -> Flown:
+    """The short mission, flown as a session does; `act` may do something at each tick."""
+    setup, story, listener = short_mission.setup(), Story(), Listener(act)
+    async with made.link(given) as link:
+        loop = FlightLoop(setup, CLOCK, link, made.pose, tuple, [story, listener])
+        direction = await _flown(loop, link, CLOCK, setup, FlightOptions(operator=Operator()), None)
+    return Flown(direction.outcome or story.outcome, direction.reason or story.reason, listener)

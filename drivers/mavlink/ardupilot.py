@@ -47,8 +47,10 @@ class ArduPilot:
     intervals_hz: Mapping[int, float] = field(default_factory=lambda: {mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: 5.0})
     hover_parameter: str = "MOT_THST_HOVER"
     thrust_slope: float = 0.87
-    spool_up_s: float = 2.1
-    """2.0 s of safety; the ramp of 0.5 s begins with the first thrust."""
+    motors_off_s: float = 2.1
+    """2.0 s, as seen in flight."""
+    ramp_s: float = 0.6
+    """0.5 s (MOT_SPOOL_TIME); at no thrust its motors would stay at ground idle."""
     settles_s: float = 25.0
     wants_origin: bool = True
 

@@ -91,8 +91,13 @@ class Autopilot(Protocol):
         ...
 
     @property
-    def spool_up_s(self) -> float:
-        """From arming until motors take thrust."""
+    def motors_off_s(self) -> float:
+        """So long after arming the motors take no thrust."""
+        ...
+
+    @property
+    def ramp_s(self) -> float:
+        """So long they then come up, from the first thrust on; 0 where they come at once."""
         ...
 
     @property

@@ -32,6 +32,8 @@ DESCENT_S = 30.0
 """So long poses go on to a vehicle that lands by itself while the link closes."""
 STOP_S = 1.0
 """So long closing goes on repeating an emergency stop that is not confirmed."""
+RAMP_SHARE = 0.25
+"""Of the thrust that hovers, while motors come up: it stays on the ground."""
 FLYING_M = 0.15
 """Above where it stood: higher is in the air."""
 HOVERS = (0.05, 0.9)
@@ -88,6 +90,8 @@ class MavlinkLink:
         self._custody = Custody(contact, self._outbox, self._airborne)
         self._map: ThrustMap | None = None
         self._tending: asyncio.Task[None] | None = None
+        self._idle_thrust = 0.0
+        """Of the setpoints between arming and the control loop's first."""
         self._fell_back = False
         self._restarts = self._sent = self._invalid = 0
         self._transmitted: deque[Transmission] = deque(maxlen=LOG_CAPACITY)
@@ -143,12 +147,13 @@ class MavlinkLink:
         self._require_fit()
         mode = self._contact.autopilot.flight_mode
         self._custody.begin()
+        self._idle_thrust = 0.0
         self._outbox.idle(self._clock.now_ns())
         try:
             await pause(self._clock, STREAM_S)
             await arming.enter_mode(self._controls, mode)
             await arming.arm(self._controls)
-            await pause(self._clock, self._contact.autopilot.spool_up_s)
+            await self._bring_motors_up()
             self._custody.require_armed_in(mode, self._clock.now_ns())
         except BaseException:
             self._outbox.rest(self._clock.now_ns())
@@ -167,6 +172,7 @@ class MavlinkLink:
             return
         if self._contact.picture.armed:
             flown = self._custody.landing = self._custody.flown
+            self._idle_thrust = 0.0
             self._outbox.idle(self._clock.now_ns())
             await arming.disarm(self._controls, self._custody.may_be_cut, flown=flown)
         self._outbox.rest(self._clock.now_ns())
@@ -215,6 +221,14 @@ class MavlinkLink:
             transmitted=transmitted,
             telemetry=picture.telemetry(now_ns=now_ns, lost=self._custody.lost),
         )
+
+    async def _bring_motors_up(self) -> None:
+        """Wait until the motors take thrust; where they come up with the first one only, give a little of it."""
+        autopilot = self._contact.autopilot
+        await pause(self._clock, autopilot.motors_off_s)
+        if autopilot.ramp_s > 0.0 and self._map is not None:
+            self._idle_thrust = RAMP_SHARE * self._map.hover
+            await pause(self._clock, autopilot.ramp_s)
 
     def _require_fit(self) -> None:
         """Refuse to arm what cannot be armed on this connection any more, or not now."""
@@ -268,7 +282,7 @@ class MavlinkLink:
 
     def _due(self, now_ns: int) -> None:
         if self._outbox.idles(now_ns):
-            self._transmit(self._level(), 0.0)
+            self._transmit(self._level(), self._idle_thrust)
         if self._outbox.stops(now_ns):
             arming.cut(self._controls)
 

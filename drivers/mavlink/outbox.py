@@ -1,7 +1,7 @@
 """What may go to the vehicle, and when: the rules, as a table of modes. Pure: time comes in as an argument.
 
-- Before arming, nothing. To enter the autopilot's mode it wants a stream: level at no thrust, made anew each time, on
-  the ground only; it goes on until the control loop's first setpoint.
+- Before arming, nothing. To enter the autopilot's mode it wants a stream: level, far too weak to lift, made anew each
+  time, on the ground only; it goes on until the control loop's first setpoint.
 - In flight a setpoint goes out once, at once, while it is at most 50 ms old; the freshest wins; nothing is repeated.
 - From 100 ms without a fresh one there is silence, and the autopilot's own failsafe acts. A fresh setpoint ends it.
 - Once the pilot or the autopilot has taken over, no setpoint follows, whatever mode comes.
@@ -28,7 +28,7 @@ class Mode(Enum):
     SILENT = auto()
     """Nothing."""
     IDLING = auto()
-    """Level at no thrust, on the ground; setpoints are not taken yet."""
+    """Level, too weak to lift, on the ground; setpoints are not taken yet."""
     READY = auto()
     """The same, until the first setpoint."""
     FLYING = auto()
@@ -78,7 +78,7 @@ class Outbox:
         return self.mode is Mode.FLYING and now_ns - self._fresh_ns >= FALLBACK_NS
 
     def idles(self, now_ns: int) -> bool:
-        """Whether a setpoint level at no thrust is due now; it then counts as sent."""
+        """Whether a setpoint of our own is due now; it then counts as sent."""
         if self.mode not in (Mode.IDLING, Mode.READY) or now_ns < self._next_ns:
             return False
         if self.mode is Mode.READY and now_ns - self._since_ns > IDLE_LIMIT_NS:
@@ -98,7 +98,7 @@ class Outbox:
         self._off = True
 
     def idle(self, now_ns: int) -> None:
-        """Stream level at no thrust from now on."""
+        """Stream setpoints of our own from now on."""
         self._enter(Mode.IDLING, now_ns)
 
     def ready(self, now_ns: int) -> None:

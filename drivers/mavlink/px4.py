@@ -41,8 +41,9 @@ class Px4:
     intervals_hz: Mapping[int, float] = field(default_factory=lambda: {mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 5.0})
     hover_parameter: str = "MPC_THR_HOVER"
     thrust_slope: float = 1.0
-    spool_up_s: float = 1.0
+    motors_off_s: float = 1.0
     """COM_SPOOLUP_TIME as it comes."""
+    ramp_s: float = 0.0
     settles_s: float = 5.0
     wants_origin: bool = False
 

@@ -107,4 +107,5 @@ def _peak_facts(prefix: str, peaks: Peaks) -> dict[str, float]:
         f"{prefix}peak_thrust_ratio": peaks.thrust_ratio.value,
         f"{prefix}peak_speed_m_per_s": peaks.speed.value,
         f"{prefix}peak_tilt_rad": peaks.tilt.value,
+        f"{prefix}peak_body_rate_rad_per_s": peaks.body_rate.value,
     }

@@ -15,7 +15,7 @@ from pydantic.fields import FieldInfo
 
 from lcd_flight.mission.problems import Key
 
-UNITS = {"_m_per_s": "m/s", "_deg": "deg", "_hz": "Hz", "_m": "m", "_s": "s", "_V": "V"}
+UNITS = {"_m_per_s": "m/s", "_deg_per_s": "deg/s", "_deg": "deg", "_hz": "Hz", "_m": "m", "_s": "s", "_V": "V"}
 """Suffix of an attribute to its unit, longer ones first."""
 
 
@@ -27,7 +27,7 @@ def unit_of(attribute: str) -> str:
 def key_of(attribute: str) -> str:
     """The key under which an attribute stands in the file."""
     suffix = next((suffix for suffix in UNITS if attribute.endswith(suffix)), "")
-    return attribute if suffix == "_deg" else attribute.removesuffix(suffix)
+    return attribute.removesuffix("_per_s") if suffix.startswith("_deg") else attribute.removesuffix(suffix)
 
 
 def _describe(schema: dict[str, Any], model: type[BaseModel]) -> None:

@@ -25,6 +25,7 @@ from lcd_flight.mission.keys import Keys, Whole
 from lcd_flight.mission.problems import Key, dotted
 from lcd_flight.mission.sections import Control, Log, MotionCapture, Planner, Rehearse, Safety, VehicleKeys
 from lcd_flight.model import Geofence, SafetyLimits
+from lcd_flight.planning.limits import PlanLimits
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +98,16 @@ class Mission(Keys):
     def geofence(self) -> Geofence:
         """`safety.geofence` in the house's vocabulary."""
         return Geofence(self.safety.geofence.min_m, self.safety.geofence.max_m)
+
+    def plan_limits(self) -> PlanLimits:
+        """`planner.limits` in the planner's vocabulary."""
+        keys = self.planner.limits
+        return PlanLimits(
+            max_velocity=keys.max_velocity_m_per_s,
+            max_thrust_ratio=keys.max_thrust_ratio,
+            max_tilt_rad=math.radians(keys.max_tilt_deg),
+            max_body_rate=math.radians(keys.max_body_rate_deg_per_s),
+        )
 
     def safety_limits(self) -> SafetyLimits:
         """What the monitors compare the flight with."""

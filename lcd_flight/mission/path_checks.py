@@ -9,11 +9,17 @@ import numpy as np
 
 from lcd_flight.mission.mission import Mission
 from lcd_flight.model import FlightPlan, FloatArray, Leg, LegKind, RefusedError, Vehicle
-from lcd_flight.planning.limits import PlanLimits, check_limits, peaks
+from lcd_flight.planning.limits import check_limits, peaks
 from lcd_flight.safety.fence import stopping_margin_m
 
 SAMPLE_S = 0.01
 """The path is looked at as often as the control loop runs."""
+_LIMIT_KEYS = {
+    "plan_speed": "max_velocity",
+    "plan_thrust": "max_thrust_ratio",
+    "plan_tilt": "max_tilt_deg",
+    "plan_rate": "max_body_rate_deg",
+}
 ROUNDING_M = 1e-6
 """A leg that ends on the fence, e.g. on the ground, may be this far outside."""
 
@@ -81,11 +87,8 @@ def _too_fast_for_wall(leg: Leg, mission: Mission, times: FloatArray, positions:
 
 
 def _beyond_limits(leg: Leg, mission: Mission, vehicle: Vehicle) -> Iterator[str]:
-    keys = mission.planner.limits
-    limits = PlanLimits(keys.max_velocity_m_per_s, keys.max_thrust_ratio, math.radians(keys.max_tilt_deg))
-    names = {"plan_speed": "max_velocity", "plan_thrust": "max_thrust_ratio", "plan_tilt": "max_tilt_deg"}
-    for finding in check_limits(peaks(leg.trajectory, vehicle), limits):
-        yield f"{finding.message}; fly slower or raise planner.limits.{names[finding.code]}"
+    for finding in check_limits(peaks(leg.trajectory, vehicle), mission.plan_limits()):
+        yield f"{finding.message}; fly slower or raise planner.limits.{_LIMIT_KEYS[finding.code]}"
 
 
 def _sample_times_s(leg: Leg) -> FloatArray:

@@ -11,6 +11,7 @@ from lcd_flight.mission.planned import PlannedMission, planned_mission
 from lcd_flight.mission.solution import MINIMUM_SNAP, Solution
 from lcd_flight.mission.solving import POLISHED, Solver
 from lcd_flight.model import InputError, RefusedError, Simulator, Vehicle
+from lcd_flight.planning.cost.limit_cost import LimitCost
 from lcd_flight.planning.cost.model_card import ModelCard
 from lcd_flight.planning.cost.model_file import SUFFIX, check_fits, load_model, model_names
 from lcd_flight.planning.cost.proxy import ThrustProxy
@@ -81,7 +82,9 @@ def _solver(
             )
     arena = (simulator or plugins.simulator()) if method.endswith(POLISHED) else None
     chosen = ThrustProxy() if cost is None or method.startswith("analytic") else cost
-    return Solver(method, vehicle, chosen, arena, mission.seed, mission.planner.weight), notes
+    limits = LimitCost.of(mission.plan_limits(), vehicle, mission.geofence())
+    solver = Solver(method, vehicle, chosen, arena, mission.seed, mission.planner.weight, limits=limits)
+    return solver, notes
 
 
 def _planned(mission: Mission, solver: Solver, cache: PlanCache | None, notes: list[str]) -> PlannedMission:

@@ -63,7 +63,7 @@ PlannerType: TypeAlias = Literal["learned-polished", "learned", "analytic-polish
 
 
 class PlanLimits(Keys):
-    """What every planned path is held to before the rehearsal."""
+    """What every planned path is bent to keep, and refused where it does not."""
 
     max_velocity_m_per_s: Annotated[Real, Field(gt=0.0, le=20.0)] = 5.0
     """Highest planned speed."""
@@ -71,6 +71,8 @@ class PlanLimits(Keys):
     """Highest planned thrust as a share of what the motors have; above 1 the rehearsal alone decides."""
     max_tilt_deg: Annotated[Real, Field(gt=0.0, le=180.0)] = 60.0
     """Largest planned angle between thrust and the vertical."""
+    max_body_rate_deg_per_s: Annotated[Real, Field(gt=0.0, le=7200.0)] = 1200.0
+    """Highest planned rate of roll and pitch together."""
 
 
 class Planner(Keys):

@@ -16,9 +16,11 @@ from lcd_flight.mission.assemble import TrajectoryTask
 from lcd_flight.mission.plan_key import model_hash
 from lcd_flight.mission.solution import MINIMUM_SNAP, ModelStamp, Option, Predictions, Solution
 from lcd_flight.model import FloatArray, RolloutOptions, Simulator, Trajectories, Trajectory, Vehicle
+from lcd_flight.planning.cost.limit_cost import LimitCost
 from lcd_flight.planning.cost.proxy import ANALYTIC_SNAP_WEIGHT, ThrustProxy
 from lcd_flight.planning.cost.tracking_cost import CostModel
 from lcd_flight.planning.knots import Whitening
+from lcd_flight.planning.limited import limited
 from lcd_flight.planning.minimum_snap import minimum_snap
 from lcd_flight.planning.planner import ErrorPredictor, PlannerOptions, PlanResult, Timing, TrackingCost, plan_task
 from lcd_flight.planning.polish import PolishSettings, candidates_of, polish
@@ -43,6 +45,8 @@ class Solver:
     weight: float = 1.0
     """Of the cost against extra snap."""
     settings: PolishSettings = field(default_factory=PolishSettings)
+    limits: LimitCost = field(default_factory=LimitCost)
+    """Of the mission, which the plan is bent to keep."""
 
     @property
     def polishes(self) -> bool:
@@ -63,7 +67,7 @@ class Solver:
 
     def options(self, task: TrajectoryTask) -> Mapping[str, Option]:
         """All that its plan of a task depends on besides task, vehicle, cost and programs."""
-        found = asdict(self._options(task))
+        found = asdict(self._options(task)) | self.limits.named()
         if self.polishes:
             search = {f"search_{key}": value for key, value in asdict(self.settings.search).items()}
             flights = asdict(self.settings)
@@ -76,7 +80,7 @@ class Solver:
         if self.method == MINIMUM_SNAP:
             return Solution(minimum_snap(task.waypoints, task.durations_s), MINIMUM_SNAP)
         options = self._options(task)
-        result = plan_task(task.waypoints, task.durations_s, self.cost, options)
+        result = plan_task(task.waypoints, task.durations_s, limited(self.cost, self.limits), options)
         fallback = result.fallback[0]
         plan = result.plans[0]
         if self.polishes and task.durations_s.size > 1:
@@ -104,7 +108,7 @@ class Solver:
         space = Whitening.of(task.waypoints[None], task.durations_s[None])
         candidates = candidates_of(space, result)
         assert self.simulator is not None  # noqa: S101 - a method that polishes is made with one
-        arena = Arena(self.simulator, self.vehicle, RolloutOptions(loop="flight"))
+        arena = Arena(self.simulator, self.vehicle, RolloutOptions(loop="flight"), self.limits)
         numbers = np.zeros(1, dtype=np.int64)
         found = polish(
             space, candidates, arena, seed=self.seed, tasks=numbers, timing=options.timing, settings=self.settings

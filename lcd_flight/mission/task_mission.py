@@ -30,7 +30,8 @@ planner:
   type: {planner}
   speed: {speed:.10g}                          # m/s, mean over a segment
   transfer_speed: 1.0
-  limits: {{max_velocity: 20.0, max_thrust_ratio: 3.0, max_tilt_deg: 180}}   # the rehearsal alone decides
+  # no limits: the rehearsal alone decides
+  limits: {{max_velocity: 20.0, max_thrust_ratio: 3.0, max_tilt_deg: 180, max_body_rate_deg: 7200}}
 
 plan:
   - takeoff: {{height: 1.0, duration: 2.5}}

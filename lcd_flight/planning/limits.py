@@ -1,4 +1,4 @@
-"""What a finished plan asks of the vehicle at its worst: speed, tilt, thrust, and where; and the limits on them."""
+"""What a finished plan asks of the vehicle at its worst: speed, tilt, thrust, body rates; and the limits on them."""
 
 from __future__ import annotations
 
@@ -34,6 +34,8 @@ class Peaks:
     """rad, angle of the thrust from the vertical."""
     thrust_ratio: Peak
     """m |a + g e3| over the vehicle's static thrust; drag is left out."""
+    body_rate: Peak
+    """rad/s, roll and pitch together: how fast the thrust turns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,14 +47,17 @@ class PlanLimits:
     max_thrust_ratio: float | None = None
     """Of the vehicle's static thrust."""
     max_tilt_rad: float | None = None
+    max_body_rate: float | None = None
+    """rad/s, roll and pitch together."""
 
 
 def peaks(trajectory: Trajectory, vehicle: Vehicle) -> Peaks:
-    """The largest speed, tilt and thrust ratio of `trajectory` flown by `vehicle`."""
+    """The largest speed, tilt, thrust ratio and body rate of `trajectory` flown by `vehicle`."""
     return Peaks(
         speed=_peak(trajectory, _speed),
         tilt=_peak(trajectory, _tilt),
         thrust_ratio=_peak(trajectory, lambda t, at: vehicle.mass_kg * _force(t, at) / vehicle.max_thrust_N),
+        body_rate=_peak(trajectory, _body_rate),
     )
 
 
@@ -62,6 +67,7 @@ def check_limits(found: Peaks, limits: PlanLimits) -> tuple[Finding, ...]:
         ("plan_speed", "speed", "m/s", 1.0, found.speed, limits.max_velocity),
         ("plan_tilt", "tilt", "deg", np.degrees(1.0), found.tilt, limits.max_tilt_rad),
         ("plan_thrust", "thrust", "% of full thrust", 100.0, found.thrust_ratio, limits.max_thrust_ratio),
+        ("plan_rate", "body rate", "deg/s", np.degrees(1.0), found.body_rate, limits.max_body_rate),
     )
     return tuple(
         Finding(
@@ -106,6 +112,13 @@ def _specific_force(trajectory: Trajectory, times_s: FloatArray) -> FloatArray:
 def _force(trajectory: Trajectory, times_s: FloatArray) -> FloatArray:
     """(T,) |a + g e3| in m/s^2."""
     return np.asarray(np.linalg.norm(_specific_force(trajectory, times_s), axis=1))
+
+
+def _body_rate(trajectory: Trajectory, times_s: FloatArray) -> FloatArray:
+    """(T,) rad/s across the thrust: |j x F| / |F|^2; without a thrust to turn, infinite or none."""
+    force = _specific_force(trajectory, times_s)
+    turning = np.linalg.norm(np.cross(trajectory.derivative(times_s, 3)[:, :3], force), axis=1)
+    return np.asarray(turning / np.maximum((force**2).sum(axis=1), np.finfo(float).tiny))
 
 
 def _tilt(trajectory: Trajectory, times_s: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ from lcd_flight.model import FloatArray, IntArray, RolloutLabels, SeedArray, Tra
 from lcd_flight.model.streams import Stream
 from lcd_flight.planning.knots import Whitening
 from lcd_flight.planning.planner import PlanResult, Timing
-from lcd_flight.planning.search import Arena, SearchSettings, search, tracking_cost
+from lcd_flight.planning.search import Arena, SearchSettings, search
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ class Polished:
     chosen: IntArray
     """(N,) which candidate it began with."""
     cost: FloatArray
-    """(N,) log of the p = 8 mean of the error in m, mean over the final flights."""
+    """(N,) log of the p = 8 mean of the error in m, mean over the final flights; and the arena's handicap."""
     minimum_cost: FloatArray
     """(N,) the same of the start, under the same noise; never below `cost`."""
     largest_error_m: FloatArray
@@ -132,11 +132,11 @@ class _Flights:
     def cost(self, candidate: Candidate, purpose: str, times: int) -> tuple[FloatArray, FloatArray]:
         """Mean cost (N,) and largest error (N,) over so many flights."""
         plans = self.space.plan(candidate.z, candidate.theta)
+        flown = plans.take(np.repeat(np.arange(len(plans)), times))
         noise: SeedArray = Stream(self.seed, f"polish/{purpose}").words(self.tasks, times).reshape(-1)
-        rows = np.repeat(np.arange(len(plans)), times)
-        labels = self.arena.simulator.rollout(plans.take(rows), self.arena.vehicle, noise, self.arena.options)
+        labels = self.arena.simulator.rollout(flown, self.arena.vehicle, noise, self.arena.options)
         shape = (len(plans), times)
-        return tracking_cost(labels).reshape(shape).mean(axis=1), _error(labels).reshape(shape).max(axis=1)
+        return self.arena.cost(flown, labels).reshape(shape).mean(axis=1), _error(labels).reshape(shape).max(axis=1)
 
 
 def _error(labels: RolloutLabels) -> FloatArray:

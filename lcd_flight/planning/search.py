@@ -50,11 +50,18 @@ class SearchSettings:
 
 @dataclass(frozen=True, slots=True)
 class Arena:
-    """Where plans are flown."""
+    """Where plans are flown, and what counts there."""
 
     simulator: Simulator
     vehicle: Vehicle
     options: RolloutOptions
+    handicap: Callable[[Trajectories], FloatArray] | None = None
+    """(N,) what is added to each plan's cost, e.g. for limits that it breaks; None: nothing."""
+
+    def cost(self, plans: Trajectories, labels: RolloutLabels) -> FloatArray:
+        """(N,) of plans that were flown."""
+        flown = tracking_cost(labels)
+        return flown if self.handicap is None else flown + self.handicap(plans)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,7 +93,7 @@ class Found:
     theta: FloatArray
     """(N, S)"""
     cost: FloatArray
-    """(N,) `tracking_cost`, as flown then."""
+    """(N,) `Arena.cost`, as flown then."""
     mean_z: FloatArray
     """(N, S - 1, 3, 4) what the populations came to be drawn around: under no noise's spell, but never flown."""
     mean_theta: FloatArray
@@ -165,7 +172,7 @@ def _fly(number: int, samples: FloatArray, crowd: Whitening, arena: Arena, noise
     theta = samples[..., inner * rows * axes :]
     plans = crowd.plan(z.reshape(crowd.z_shape), theta.reshape(count * size, -1))
     labels = arena.simulator.rollout(plans, arena.vehicle, np.repeat(noise, size), arena.options)
-    return Generation(number, z, theta, plans, labels, tracking_cost(labels).reshape(count, size), noise)
+    return Generation(number, z, theta, plans, labels, arena.cost(plans, labels).reshape(count, size), noise)
 
 
 def _elite_moments(

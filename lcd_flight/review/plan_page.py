@@ -124,4 +124,5 @@ def _peaks(peaks: Peaks) -> list[tuple[str, str]]:
         ("peak thrust, of full thrust", f"{100.0 * peaks.thrust_ratio.value:.0f} %"),
         ("peak speed", f"{peaks.speed.value:.2f} m/s"),
         ("largest tilt", f"{math.degrees(peaks.tilt.value):.0f}°"),
+        ("highest body rate", f"{math.degrees(peaks.body_rate.value):.0f}°/s"),
     ]

@@ -9,11 +9,11 @@ training goes on where it stopped. The networks are trained from scratch in each
 from __future__ import annotations
 
 import shutil
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
+from lcd_flight.files import writing
 from lcd_flight.learning.collect import collect
 from lcd_flight.learning.dataset import Dataset
 from lcd_flight.learning.extras import require_pyarrow, require_torch
@@ -168,12 +168,5 @@ def _rows_of_shards(dataset: Dataset, rows: int) -> list[int]:
 
 def _copy(source: Path, out: Path) -> None:
     """Whole or not at all."""
-    partial = out.with_name(f"{out.name}.partial")
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
+    with writing(out) as partial:
         shutil.copyfile(source, partial)
-        partial.replace(out)
-    except OSError as error:
-        with suppress(OSError):
-            partial.unlink()
-        raise InputError(f"{out}: cannot be written ({error}); give another place") from error

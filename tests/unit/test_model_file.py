@@ -196,13 +196,14 @@ def test_a_folder_in_place_of_a_file_is_refused(tmp_path: Path) -> None:
     folder = tmp_path / "m.safetensors"
     folder.mkdir()
     assert refusal(folder)
-    with pytest.raises(InputError, match="cannot be written"):
+    with pytest.raises(InputError, match="is a folder; name a file in it"):
         save_model(folder, single_model(), cost_models.CARD, PLANS)
 
 
-def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
     with pytest.raises(InputError, match="cannot be written"):
-        save_model(tmp_path / "gone" / "m.safetensors", single_model(), cost_models.CARD, PLANS)
+        save_model(tmp_path / "file" / "m.safetensors", single_model(), cost_models.CARD, PLANS)
 
 
 def test_a_model_fits_its_own_vehicle_and_loop_only(path: Path) -> None:

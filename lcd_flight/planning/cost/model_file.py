@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lcd_flight.files import write_whole
 from lcd_flight.model import InputError, Loop, Trajectories
 from lcd_flight.planning.cost.features import FEATURE_VERSION
 from lcd_flight.planning.cost.inputs import INPUTS
@@ -77,7 +78,7 @@ def save_model(path: Path, model: CostModel, card: ModelCard, test_plans: Trajec
         "card": card.model_dump(mode="json"),
     }
     metadata = json.dumps(about | {"sha256": _digest(tensors, about)}, sort_keys=True)
-    _write(path, save(tensors, {_KEY: metadata}))
+    write_whole(path, save(tensors, {_KEY: metadata}))
     return replace(model, card=card)
 
 
@@ -201,12 +202,3 @@ def _digest(tensors: Tensors, about: Mapping[str, Any]) -> str:
         tensor = np.ascontiguousarray(tensors[name])
         sha.update(f"{name} {tensor.dtype.str} {tensor.shape}".encode() + tensor.tobytes())
     return sha.hexdigest()
-
-
-def _write(path: Path, data: bytes) -> None:
-    part = path.with_name(f".{path.name}.part")
-    try:
-        part.write_bytes(data)
-        part.replace(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); choose another folder") from None

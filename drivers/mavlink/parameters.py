@@ -84,7 +84,10 @@ class Parameters:
         """
         kind = self._kinds[name]
         wire = self._autopilot.value_to(value, kind)
+        self.values.pop(name, None)
         self._session.send(mavlink.MAVLink_param_set_message(*self._session.vehicle, name.encode(), wire, kind))
+        # Its echo may tell what was sent instead of what is kept: it is waited for and then asked again.
+        await until(self._clock, lambda: name in self.values, ANSWER_S)
         found = (await self.read([name])).get(name)
         if found is None or not math.isclose(found, value, rel_tol=1e-5, abs_tol=1e-9):
             told = "does not answer" if found is None else f"reads {found:g}"

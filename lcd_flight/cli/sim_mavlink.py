@@ -20,9 +20,10 @@ def mavlink(
     mission: Annotated[
         str | None, typer.Argument(metavar="[MISSION]", help="Take vehicle, place and motion capture from it.")
     ] = None,
-    flavour: Annotated[str, typer.Option(help="px4 or ardupilot.")] = "px4",
+    flavour: Annotated[str | None, typer.Option(help="px4 or ardupilot; that of the mission, otherwise px4.")] = None,
     port: Annotated[
-        int | None, typer.Option(help="UDP port that clients listen on, 14540; with --tcp 5760.", min=0, max=65535)
+        int | None,
+        typer.Option(help="UDP port that clients listen on, 14540; with --tcp 5760.", min=0, max=65535),
     ] = None,
     host: Annotated[str, typer.Option(help="Where they are.")] = "127.0.0.1",
     tcp: Annotated[bool, typer.Option(help="Listen on TCP instead, as ArduPilot's simulation on 5760.")] = False,
@@ -49,7 +50,7 @@ def mavlink(
     terminal = Terminal(json_line=json, quiet=quiet, color=not no_color)
     bench: Bench = bench_of(mission, vehicle or (None if mission else VEHICLE), mocap, rigid_body, seed)
     options = {
-        "flavour": flavour,
+        "flavour": flavour or _flavour_of(mission),
         "twist": twist,
         "own_mocap": own_mocap,
         "boot_s": boot,
@@ -64,6 +65,16 @@ def mavlink(
 def _port(port: int | None, tcp: bool) -> int:
     """As the simulations of PX4 and ArduPilot have it, unless said otherwise."""
     return port if port is not None else (5760 if tcp else 14540)
+
+
+def _flavour_of(mission: str | None) -> str:
+    """What `autopilot=` in the mission's URI says."""
+    from urllib.parse import parse_qs, urlsplit
+
+    from lcd_flight.mission import load_mission
+
+    uri = load_mission(mission).vehicle.uri if mission else ""
+    return parse_qs(urlsplit(uri).query).get("autopilot", ["px4"])[0]
 
 
 def _faults(given: list[str]) -> dict[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 from collections.abc import Callable
 from typing import Any, Protocol, cast
 
@@ -10,7 +11,7 @@ from lcd_flight.model import RefusedError
 from sim_bridge.mavlink.framing import split
 
 MOST_CLIENTS = 4
-"""Those that spoke last; each gets everything."""
+"""Each gets everything."""
 MOST_UNSENT = 100_000
 """Bytes that wait for a slow client; beyond, packets are lost."""
 Receive = Callable[[bytes], None]
@@ -43,31 +44,37 @@ class Port(Protocol):
 
 
 class UdpPort:
-    """A port of its own, from which it sends to HOST:PORT and to whoever talks to it."""
+    """A port of its own, from which it sends to HOST:PORT and to whoever talks to it; port 0: to the latter alone."""
 
     def __init__(self, host: str, port: int, receive: Receive) -> None:
         self._host, self._port, self._receive = host, port, receive
         self._transport: asyncio.DatagramTransport | None = None
-        self._clients: dict[Address, None] = {(host, port): None}
+        self._listener: Address | None = None
+        self._talkers: dict[Address, None] = {}
 
     @property
     def uri(self) -> str:
-        """Where it sends to."""
-        return f"udp://{self._host}:{self._port}"
+        """Where it sends to; without that, where it is."""
+        if self._port or self._transport is None:
+            return f"udp://{self._host}:{self._port}"
+        return f"udp://{self._host}:{self._transport.get_extra_info('sockname')[1]}"
 
     async def open(self) -> None:
         """Take a free port.
 
         Raises:
-            RefusedError: the host cannot be reached from here.
+            RefusedError: none is to be had, or there is no such host.
         """
         loop = asyncio.get_running_loop()
-        here = "127.0.0.1" if self._host in ("127.0.0.1", "localhost") else "0.0.0.0"  # noqa: S104 - for remote clients
         try:
+            found = await loop.getaddrinfo(self._host, self._port, family=socket.AF_INET, type=socket.SOCK_DGRAM)
+            there = (str(found[0][4][0]), self._port)
+            here = "127.0.0.1" if there[0].startswith("127.") else "0.0.0.0"  # noqa: S104 - remote clients answer
             transport, _ = await loop.create_datagram_endpoint(lambda: _Datagrams(self._hear), local_addr=(here, 0))
         except OSError as error:
-            raise RefusedError(f"{self.uri}: no port is to be had: {error.strerror or error}") from error
+            raise RefusedError(f"{self.uri} cannot be sent to: {error.strerror or error}") from error
         self._transport = transport
+        self._listener = there if self._port else None
 
     async def close(self) -> None:
         """Give it back."""
@@ -77,15 +84,16 @@ class UdpPort:
     def send(self, datagram: bytes) -> None:
         """To all clients."""
         if self._transport is not None:
-            for client in self._clients:
-                self._transport.sendto(datagram, client)
+            for client in (self._listener, *self._talkers):
+                if client is not None:
+                    self._transport.sendto(datagram, client)
 
     def _hear(self, datagram: bytes, client: Address) -> None:
-        """HOST:PORT stays; of the others the oldest makes room."""
-        if client not in self._clients:
-            if len(self._clients) >= MOST_CLIENTS:
-                del self._clients[list(self._clients)[1]]
-            self._clients[client] = None
+        """The talker that came first makes room."""
+        if client != self._listener and client not in self._talkers:
+            if len(self._talkers) >= MOST_CLIENTS:
+                del self._talkers[next(iter(self._talkers))]
+            self._talkers[client] = None
         self._receive(datagram)
 
 

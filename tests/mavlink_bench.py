@@ -34,6 +34,7 @@ from lcd_flight.model import (
     Vehicle,
 )
 from lcd_flight.model.frames import from_yaw, multiply, rotate
+from lcd_flight.wire.mocap_frame import MocapFrame, decode
 from sim_bridge.camera import Camera
 from sim_bridge.mavlink.options import MavlinkOptions as VehicleOptions
 from sim_bridge.mavlink.vehicle import SimulatedMavlink
@@ -161,14 +162,17 @@ async def bench(
     start_m: Vector3 = (0.0, 0.0, 0.0),
     yaw_rad: float = 0.0,
     age_s: float = 30.0,
+    airframe: Vehicle = VEHICLE,
+    published: list[MocapFrame] | None = None,
     **given: object,
 ) -> AsyncIterator[Bench]:
     """A vehicle that was switched on a while ago; other options as the simulated vehicle has them.
 
-    start_m, yaw_rad: in the true world, from which motion capture's is turned by `mocap_yaw_rad`.
+    start_m, yaw_rad: in the true world, from which motion capture's is turned by `mocap_yaw_rad`. published: every
+    frame is added to it.
     """
     wanted = VehicleOptions(**{"flavour": flavour, **given})  # type: ignore[arg-type]
-    vehicle = SimulatedMavlink(VEHICLE, wanted, position_m=start_m, yaw_rad=yaw_rad, seed=3, key=key)
+    vehicle = SimulatedMavlink(airframe, wanted, position_m=start_m, yaw_rad=yaw_rad, seed=3, key=key)
     vehicle.switch_on(CLOCK.now_ns())
     air = Air(vehicle, tampers=tampers)
     endpoint = f"loopback://mavlink-{next(_names)}"
@@ -176,7 +180,7 @@ async def bench(
     camera = Camera("body", 3, 0.3, 0.1, twist=False)
     try:
         async with plugins.pose_source(endpoint, "body", CLOCK) as pose:
-            context = LinkContext(VEHICLE, CLOCK, start_m, yaw_rad, seed=3, listen_poses=pose.listen)
+            context = LinkContext(airframe, CLOCK, start_m, yaw_rad, seed=3, listen_poses=pose.listen)
             made = Bench(air, pose, context, flavour, mocap_yaw_rad)
             if age_s:
                 await wait_s(age_s)
@@ -186,7 +190,10 @@ async def bench(
                     now_ns = CLOCK.now_ns()
                     air.step(now_ns)
                     if step % FRAME_STEPS == 0 and made.shows:
-                        publisher(camera.frame(made.state, now_ns, now_ns))
+                        data = camera.frame(made.state, now_ns, now_ns)
+                        publisher(data)
+                        if published is not None:
+                            published.append(decode(data))
                     await CLOCK.sleep_until(now_ns + STEP_NS)
 
             living = asyncio.create_task(live())

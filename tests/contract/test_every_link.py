@@ -1,7 +1,8 @@
 """One suite over every link: what the flight relies on, whatever is at the other end.
 
 The simulator's links fly in virtual time; layers must not change what holds, only when. The Crazyflie link flies a
-simulated Crazyflie over UDP, with cflib and its threads in between, and so in real time.
+simulated Crazyflie over UDP, with cflib and its threads in between, and so in real time. The MAVLink link flies a
+simulated autopilot of each flavour, with its bytes in memory, in virtual time.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import itertools
 from collections.abc import Awaitable, Callable
 
 import crazyflie_bench
+import mavlink_bench
 import numpy as np
 import pytest
 
@@ -39,6 +41,9 @@ SLOWEST_MS = 8
 """What the layers above may add."""
 CRAZYFLIE = "udp://"
 """Stands for a simulated Crazyflie on a port of its own."""
+MAVLINK = ("mavlink px4", "mavlink ardupilot")
+"""Stand for simulated autopilots; their heartbeat, ten a second, says what holds."""
+HEARTBEAT_MS = 105
 REAL_TIME_MS = 60
 """What threads, the vehicle's own reports and a busy machine may add."""
 
@@ -49,6 +54,7 @@ class SuiteClock:
     """Virtual time, except while a link needs the real one."""
 
     clock: Clock = VirtualClock()
+    late_ms = SLOWEST_MS
 
     def now_ns(self) -> int:
         return self.clock.now_ns()
@@ -62,14 +68,17 @@ CLOCK = SuiteClock()
 
 def late_ms() -> int:
     """How much later than stated things may be seen."""
-    return SLOWEST_MS if isinstance(CLOCK.clock, VirtualClock) else REAL_TIME_MS
+    return CLOCK.late_ms
 
 
-@pytest.fixture(params=[*URIS, pytest.param(CRAZYFLIE, marks=pytest.mark.realtime)])
+@pytest.fixture(params=[*URIS, *MAVLINK, pytest.param(CRAZYFLIE, marks=pytest.mark.realtime)])
 def uri(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     uri: str = request.param
     if uri == CRAZYFLIE:
         monkeypatch.setattr(SuiteClock, "clock", RealClock())
+        monkeypatch.setattr(SuiteClock, "late_ms", REAL_TIME_MS)
+    elif uri in MAVLINK:
+        monkeypatch.setattr(SuiteClock, "late_ms", HEARTBEAT_MS)
     return uri
 
 
@@ -95,6 +104,8 @@ def fly(uri: str, script: Script, seed: int = 3) -> list[MocapFrame]:
     """Run a script on an open link; returns all poses that were published meanwhile."""
     if uri == CRAZYFLIE:
         return asyncio.run(fly_crazyflie(script))
+    if uri in MAVLINK:
+        return fly_mavlink(uri, script)
     frames: list[MocapFrame] = []
 
     async def main() -> None:
@@ -116,6 +127,23 @@ async def fly_crazyflie(script: Script) -> list[MocapFrame]:
             link.stop_motors()
         assert not bench.left_over(), "a thread was left"
     return frames
+
+
+def fly_mavlink(uri: str, script: Script) -> list[MocapFrame]:
+    """The same with a simulated autopilot."""
+    frames: list[MocapFrame] = []
+    seen: list[MocapFrame] = []
+
+    async def main() -> None:
+        place = {"start_m": (1.0, -2.0, 0.0), "yaw_rad": 0.5}
+        async with mavlink_bench.bench(uri.split()[1], airframe=VEHICLE, published=frames, **place) as bench:
+            async with bench.link() as link:
+                frames.clear()
+                await script(link, frames)
+                seen.extend(frames)
+
+    mavlink_bench.run(main)
+    return seen
 
 
 async def wait_ms(milliseconds: float) -> None:
@@ -211,8 +239,9 @@ def test_an_armed_vehicle_flies_its_setpoints(uri: str) -> None:
         assert now.sent > 0
         assert now.telemetry is not None
         assert now.telemetry.armed
-        assert now.telemetry.motor_shares is not None
-        assert all(0.0 < share < 1.0 for share in now.telemetry.motor_shares)
+        if uri not in MAVLINK:  # which of its outputs are motors, an autopilot does not say
+            assert now.telemetry.motor_shares is not None
+            assert all(0.0 < share < 1.0 for share in now.telemetry.motor_shares)
 
     assert fly(uri, script)[-1].position[2] > 0.5
 
@@ -268,6 +297,9 @@ def test_from_a_tenth_of_a_second_without_a_setpoint_the_fallback_acts_and_says_
 
 
 def test_the_fallback_is_level_and_comes_down_slowly(uri: str) -> None:
+    if uri in MAVLINK:
+        pytest.skip("its fallback is silence: the autopilot's own failsafe flies")
+
     async def script(link: Link, frames: list[MocapFrame]) -> None:
         await climb(link, 1.0)
         await stream(link, AttitudeThrust(VEHICLE.weight_N, (0.1, 0.0, 0.0, 0.995)), 0.3)
@@ -311,8 +343,9 @@ def test_a_stop_is_latched(uri: str) -> None:
         await stream(link, thrust(1.5), 2.0)
         telemetry = report(link).telemetry
         assert telemetry is not None
-        assert telemetry.motor_shares is not None
-        assert max(telemetry.motor_shares) == 0.0
+        if uri not in MAVLINK:
+            assert telemetry.motor_shares is not None
+            assert max(telemetry.motor_shares) == 0.0
         with pytest.raises(RefusedError, match="motors were stopped"):
             await link.arm()
 
@@ -328,8 +361,9 @@ def test_disarming_on_the_ground_can_be_undone(uri: str) -> None:
         telemetry = report(link).telemetry
         assert telemetry is not None
         assert not telemetry.armed
-        assert telemetry.motor_shares is not None
-        assert max(telemetry.motor_shares) == 0.0
+        if uri not in MAVLINK:
+            assert telemetry.motor_shares is not None
+            assert max(telemetry.motor_shares) == 0.0
         await climb(link)
 
     fly(uri, script)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import random
 from collections.abc import Callable
 from pathlib import Path
@@ -20,11 +21,19 @@ PILOT = {"px4": ("posctl", "POSCTL"), "ardupilot": ("loiter", "LOITER")}
 Act = Callable[[Bench, TickInputs, Tick], None]
 
 
+def nothing(_made: Bench, _inputs: TickInputs, _tick: Tick) -> None:
+    """Let it fly."""
+
+
+def unchecked(_made: Bench, _done: Flown) -> None:
+    """Leave it at the outcome."""
+
+
 def flown(
     flavour: str,
     given: str = "",
-    act: Act = lambda _made, _inputs, _tick: None,
-    check: object = None,
+    act: Act = nothing,
+    check: Callable[[Bench, Flown], None] = unchecked,
     **options: object,
 ) -> Flown:
     """One flight; `check` may look at the bench afterwards."""
@@ -34,8 +43,7 @@ def flown(
         async with bench(flavour, **options) as made:  # type: ignore[arg-type]
             done = await flight(made, given, lambda inputs, tick: act(made, inputs, tick))
             made_flight.append(done)
-            if callable(check):
-                check(made, done)
+            check(made, done)
 
     run(main)
     return made_flight[0]
@@ -75,7 +83,7 @@ def test_a_flight_lands_and_the_autopilot_disarms_in_its_own_mode(flavour: str) 
         assert min(setpoints) >= armed_ns  # nothing moves before
         landed_ns = next(i.now_ns for i, t in done.listener.flight if t.phase is Phase.LANDED)
         in_flight = [at_ns for at_ns in setpoints if armed_ns + 5e9 < at_ns < landed_ns]
-        gaps_ms = {round((b - a) / 1e6) for a, b in zip(in_flight, in_flight[1:], strict=False)}
+        gaps_ms = {round((b - a) / 1e6) for a, b in itertools.pairwise(in_flight)}
         assert gaps_ms == {10}
         poses = [at_ns for at_ns, _ in made.air.sent(ODOMETRY)]
         assert 45 < (len(poses) - 1) / (poses[-1] - poses[0]) * 1e9 < 51
@@ -171,7 +179,7 @@ def test_a_vehicle_that_hears_nothing_any_more_lands_by_its_own_failsafe() -> No
 
 @pytest.mark.parametrize(("share", "outcome"), [(0.01, Outcome.LANDED), (0.05, Outcome.LANDED), (0.3, Outcome.ABORTED)])
 def test_loss_both_ways(share: float, outcome: Outcome) -> None:
-    luck = random.Random(4)
+    luck = random.Random(4)  # noqa: S311 - chance, not secrecy
     losing = [False]
 
     def tampers(data: bytes, _up: bool, _now_ns: int) -> list[bytes]:
@@ -189,7 +197,7 @@ def test_loss_both_ways(share: float, outcome: Outcome) -> None:
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_duplicates_and_reorder_are_no_loss(flavour: str) -> None:
-    luck = random.Random(5)
+    luck = random.Random(5)  # noqa: S311 - chance, not secrecy
     held: dict[bool, list[bytes]] = {True: [], False: []}
 
     def tampers(data: bytes, up: bool, _now_ns: int) -> list[bytes]:
@@ -208,7 +216,7 @@ def test_duplicates_and_reorder_are_no_loss(flavour: str) -> None:
 
 
 def test_a_heartbeat_of_another_system_and_a_flood_of_rubbish_change_nothing() -> None:
-    luck = random.Random(6)
+    luck = random.Random(6)  # noqa: S311 - chance, not secrecy
 
     def act(made: Bench, _inputs: TickInputs, _tick: Tick) -> None:
         for _ in range(5):

@@ -10,12 +10,13 @@ import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from sim_bridge.mavlink.autopilot import CRITICAL, INFO, NS_PER_S, AttitudeTarget, Autopilot, Result
+from sim_bridge.mavlink.autopilot import Autopilot
 from sim_bridge.mavlink.estimator import SeenPose
 from sim_bridge.mavlink.frames import heading, unit
 from sim_bridge.mavlink.guidance import Wish, towards
-from sim_bridge.mavlink.odometry import LOCAL_FRD, pose_of_odometry, pose_of_vision
+from sim_bridge.mavlink.odometry import LOCAL_FRD, pose_of_odometry
 from sim_bridge.mavlink.stabilizer import Gains
+from sim_bridge.mavlink.vocabulary import CRITICAL, INFO, NS_PER_S, AttitudeTarget, Result
 
 STABILIZE, ALT_HOLD, GUIDED, LOITER, RTL, LAND, BRAKE, GUIDED_NOGPS = 0, 2, 4, 5, 6, 9, 17, 20
 _PLACED = frozenset({GUIDED, LOITER, RTL, BRAKE})
@@ -23,6 +24,8 @@ _BY_HAND = frozenset({STABILIZE, ALT_HOLD, LOITER})
 _UNARMABLE = frozenset({LAND, RTL, BRAKE})
 THRUST_IS_THRUST = 8
 """GUID_OPTIONS."""
+RATES = 0b111
+"""Bits of SET_ATTITUDE_TARGET.type_mask: these are ignored, and with them all is as it should be."""
 EXTERNAL_NAV = 6
 """EK3_SRC1_*"""
 OFF_S, RAMP_S = 2.0, 0.5
@@ -122,8 +125,11 @@ class ArduPilot(Autopilot):
         return next((text for fails, text in checks if fails), "")
 
     def take_attitude(self, message: Any) -> None:
-        """Dropped in silence unless all three rates are ignored, and attitude and thrust are given and fit."""
-        if self.mode not in (GUIDED, GUIDED_NOGPS) or message.type_mask != 0b111:
+        """Dropped in silence unless attitude and thrust are given and fit; with some of the rates GUIDED begins anew."""
+        if self.mode not in (GUIDED, GUIDED_NOGPS) or message.type_mask & ~RATES:
+            return
+        if message.type_mask not in (0, RATES):
+            self.request_mode(self.mode)
             return
         size = sum(part * part for part in message.q)
         if not abs(size - 1.0) <= 1e-3:
@@ -134,23 +140,13 @@ class ArduPilot(Autopilot):
         w, x, y, z = message.q
         self.target = AttitudeTarget(unit((w, x, y, z)), thrust, self.now_ns)
 
-    def take_odometry(self, message: Any) -> None:
+    def _pose_of(self, message: Any) -> SeenPose | None:
         """LOCAL_FRD alone."""
-        self._see(pose_of_odometry(message, frozenset({LOCAL_FRD}), None))
+        return pose_of_odometry(message, frozenset({LOCAL_FRD}), None)
 
-    def take_vision(self, message: Any) -> None:
-        """The older way."""
-        self._see(pose_of_vision(message))
-
-    def feed(self, pose: SeenPose) -> None:
-        """As if it had come as ODOMETRY, its origin set."""
-        if self.origin is None:
-            self.set_origin(0, 0, 0)
-        self._see(pose)
-
-    def _see(self, pose: SeenPose | None) -> None:
+    def _see(self, pose: SeenPose) -> None:
         wanted = ("EK3_SRC1_POSXY", "EK3_SRC1_POSZ")
-        if pose is None or not self.parameters["VISO_TYPE"] or any(self.parameters[n] != EXTERNAL_NAV for n in wanted):
+        if not self.parameters["VISO_TYPE"] or any(self.parameters[name] != EXTERNAL_NAV for name in wanted):
             return
         self.estimator.see(
             pose,

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
-from enum import IntEnum
 from typing import Any, ClassVar
 
 from lcd_flight.model.frames import yaw_of
@@ -13,13 +11,11 @@ from sim_bridge.mavlink.body import Body
 from sim_bridge.mavlink.estimator import Estimator, SeenPose
 from sim_bridge.mavlink.frames import Hamilton, heading, level, ned_attitude
 from sim_bridge.mavlink.guidance import Goal, Wish, towards
+from sim_bridge.mavlink.odometry import pose_of_vision
 from sim_bridge.mavlink.parameters import Parameters
 from sim_bridge.mavlink.stabilizer import Gains, Stabilizer
+from sim_bridge.mavlink.vocabulary import INFO, NS_PER_S, AttitudeTarget, Result, Setup
 
-NS_PER_S = 1e9
-ARM_MAGIC = 21196.0
-CRITICAL, WARNING, INFO = 2, 4, 6
-"""MAV_SEVERITY"""
 CONTACT_M = 0.03
 """Lower, it stands or bounces."""
 SETTLE = 1.5
@@ -28,38 +24,6 @@ LOW_FORCE = 0.5
 """Of the weight: on the floor below it, it counts as put down."""
 MOST_TEXTS = 100
 """Texts that wait to be sent."""
-
-
-class Result(IntEnum):
-    """MAV_RESULT."""
-
-    ACCEPTED = 0
-    TEMPORARILY_REJECTED = 1
-    DENIED = 2
-    UNSUPPORTED = 3
-    FAILED = 4
-
-
-@dataclass(frozen=True, slots=True)
-class AttitudeTarget:
-    """A SET_ATTITUDE_TARGET that was taken."""
-
-    attitude: Hamilton
-    thrust: float
-    """0 to 1."""
-    came_ns: int
-
-
-@dataclass(frozen=True, slots=True)
-class Setup:
-    """How a vehicle of a flavour is to be."""
-
-    hover_thrust: float
-    """At which it truly hovers, 0 to 1."""
-    boot_s: float
-    """Until it can be armed."""
-    rc: bool
-    """Whether a remote control is on."""
 
 
 class Autopilot(ABC):
@@ -119,16 +83,12 @@ class Autopilot(ABC):
         """SET_ATTITUDE_TARGET."""
 
     @abstractmethod
-    def take_odometry(self, message: Any) -> None:
-        """ODOMETRY."""
+    def _pose_of(self, message: Any) -> SeenPose | None:
+        """What ODOMETRY says, where it is taken."""
 
     @abstractmethod
-    def take_vision(self, message: Any) -> None:
-        """VISION_POSITION_ESTIMATE."""
-
-    @abstractmethod
-    def feed(self, pose: SeenPose) -> None:
-        """A pose of its own motion capture."""
+    def _see(self, pose: SeenPose) -> None:
+        """Take a pose as far as parameters say so."""
 
     @abstractmethod
     def _react(self) -> None:
@@ -175,6 +135,19 @@ class Autopilot(ABC):
     def force(self) -> float:
         """Collective force that the rotors are asked for, as a share of the weight."""
         return self._force
+
+    def take_odometry(self, message: Any) -> None:
+        """ODOMETRY."""
+        self.feed(self._pose_of(message))
+
+    def take_vision(self, message: Any) -> None:
+        """VISION_POSITION_ESTIMATE."""
+        self.feed(pose_of_vision(message))
+
+    def feed(self, pose: SeenPose | None) -> None:
+        """A pose from anywhere; None: there was none."""
+        if pose is not None:
+            self._see(pose)
 
     def step(self, now_ns: int) -> None:
         """Live one period."""

@@ -14,9 +14,12 @@ from pymavlink.dialects.v20 import common
 from sim_bridge.mavlink.ardupilot import GUIDED, ArduPilot
 from sim_bridge.mavlink.ardupilot import LAND as COPTER_LAND
 from sim_bridge.mavlink.ardupilot import RTL as COPTER_RTL
-from sim_bridge.mavlink.autopilot import ARM_MAGIC, Autopilot, Result
+from sim_bridge.mavlink.autopilot import Autopilot
 from sim_bridge.mavlink.px4 import LAND, RTL, TAKEOFF, Px4, custom_mode
+from sim_bridge.mavlink.vocabulary import Result
 
+ARM_ANYWAY = 21196.0
+"""The magic number that arms or disarms whatever the checks say."""
 ARM_WITHOUT_CHECKS = 2989.0
 """ArduPilot's other magic number."""
 REBOOT_ANYWAY = 20190226.0
@@ -60,7 +63,7 @@ def _arm(params: Params, desk: Desk) -> Result:
     if params[0] not in (0.0, 1.0):
         return Result.UNSUPPORTED
     arm, copter = params[0] == 1.0, isinstance(desk.pilot, ArduPilot)
-    forced = params[1] == ARM_MAGIC or (copter and arm and params[1] == ARM_WITHOUT_CHECKS)
+    forced = params[1] == ARM_ANYWAY or (copter and arm and params[1] == ARM_WITHOUT_CHECKS)
     return desk.pilot.request_arm(arm, forced)
 
 

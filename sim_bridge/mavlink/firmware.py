@@ -11,32 +11,42 @@ from pymavlink.dialects.v20 import common
 
 from sim_bridge.mavlink import telemetry
 from sim_bridge.mavlink.ardupilot import ArduPilot
-from sim_bridge.mavlink.autopilot import INFO, Autopilot, Result
+from sim_bridge.mavlink.autopilot import Autopilot
 from sim_bridge.mavlink.codec import Heard
 from sim_bridge.mavlink.commands import acknowledgement, execute
+from sim_bridge.mavlink.parameter_service import ParameterService
 from sim_bridge.mavlink.parameters import Parameters
 from sim_bridge.mavlink.px4 import Px4
+from sim_bridge.mavlink.vocabulary import Result
 
-HASH = "_HASH_CHECK"
-"""What PX4 begins its list with; writing it ends the list."""
 COMPONENT = common.MAV_COMP_ID_AUTOPILOT1
 EVERYBODY = 0
 MOST_WAITING = 500
 """Answers that are not sent yet; more are lost."""
-LISTED_EACH = 5
-"""Parameters of a list that are sent in a period."""
-READ_NS, WRITE_NS, REBOOT_NS = 100_000_000, 20_000_000, 100_000_000
-"""How long ArduPilot takes to answer; until a reboot begins."""
+REBOOT_NS = 100_000_000
+"""Until a reboot begins."""
+SHORTEST_NS, LONGEST_US = 1_000_000, 2.0**31 - 1.0
+"""Between two messages of a kind; the longest is what MESSAGE_INTERVAL can say."""
 LONGEST_TEXT = 50
 
 
 class Firmware:
     """One boot: an autopilot, its streams and its services."""
 
-    def __init__(self, pilot: Autopilot, parameters: Parameters, system: int, unix_ns: Callable[[int], int]) -> None:
+    def __init__(
+        self,
+        pilot: Autopilot,
+        parameters: Parameters,
+        unix_ns: Callable[[int], int],
+        *,
+        system: int,
+        param_error: bool = False,
+        rejected: int = 0,
+    ) -> None:
+        """param_error: whether it has PARAM_ERROR. rejected: a command that is denied whatever it asks for, a fault."""
         self.pilot = pilot
-        self._parameters = parameters
-        self._system = system
+        self._parameters = ParameterService(parameters, pilot, self._answer, param_error)
+        self._system, self._rejected = system, rejected
         self._unix_ns = unix_ns
         px4 = isinstance(pilot, Px4)
         self._builders = dict(telemetry.PX4_BUILDERS if px4 else telemetry.ARDUPILOT_BUILDERS)
@@ -47,22 +57,17 @@ class Firmware:
         self._later: list[tuple[int, int, Any]] = []
         self._numbers = itertools.count()
         self._texts = itertools.count(1)
-        self._listed: int | None = None
         self.reboot_ns: int | None = None
         """When it is going to reboot."""
         self.key: bytes | None = None
         """A key that came in SETUP_SIGNING; all zeros remove the one there is."""
-        self.tells_param_errors = False
-        """Whether it has PARAM_ERROR."""
-        self.rejected = 0
-        """A command that is denied, whatever it asks for: a fault."""
         self._acts: dict[int, Callable[[Heard], None]] = {
             common.MAVLINK_MSG_ID_COMMAND_LONG: self._command_long,
             common.MAVLINK_MSG_ID_COMMAND_INT: self._command_int,
             common.MAVLINK_MSG_ID_SET_MODE: self._set_mode,
-            common.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: self._list,
-            common.MAVLINK_MSG_ID_PARAM_REQUEST_READ: self._read,
-            common.MAVLINK_MSG_ID_PARAM_SET: self._write,
+            common.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: self._parameters.list_all,
+            common.MAVLINK_MSG_ID_PARAM_REQUEST_READ: self._parameters.read,
+            common.MAVLINK_MSG_ID_PARAM_SET: self._parameters.write,
             common.MAVLINK_MSG_ID_TIMESYNC: self._timesync,
             common.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: lambda heard: self.pilot.take_attitude(heard.message),
             common.MAVLINK_MSG_ID_ODOMETRY: lambda heard: self.pilot.take_odometry(heard.message),
@@ -87,7 +92,8 @@ class Firmware:
         for kind in due:
             self._due[kind] += self._intervals[kind] * (1 + (now_ns - self._due[kind]) // self._intervals[kind])
         messages = [self._builders[kind](self.pilot) for kind in due]
-        return [*(message for message in messages if message is not None), *self._texted(), *self._waiting(now_ns)]
+        told = [message for message in messages if message is not None]
+        return [*told, *self._texted(), *self._waiting(now_ns), *self._parameters.listed()]
 
     def set_interval(self, kind: int, interval_us: float) -> bool:
         """0: as after a boot; negative: never."""
@@ -97,7 +103,7 @@ class Firmware:
         if interval_us == 0.0 and kind in self._rates:
             interval_us = 1e6 / self._rates[kind]
         if interval_us > 0.0:
-            self._intervals[kind] = max(1_000_000, round(min(interval_us, 1e12) * 1e3))
+            self._intervals[kind] = max(SHORTEST_NS, round(min(interval_us, LONGEST_US) * 1e3))
             self._due[kind] = self.pilot.now_ns
         return True
 
@@ -135,10 +141,6 @@ class Firmware:
         ready = []
         while self._later and self._later[0][0] <= now_ns:
             ready.append(heapq.heappop(self._later)[2])
-        if self._listed is not None:
-            upto = min(self._listed + LISTED_EACH, len(self._parameters))
-            ready += [self._parameters.message(index) for index in range(self._listed, upto)]
-            self._listed = upto if upto < len(self._parameters) else None
         return ready
 
     def _texted(self) -> list[Any]:
@@ -163,7 +165,7 @@ class Firmware:
 
     def _command(self, heard: Heard, params: tuple[float, ...]) -> None:
         command = heard.message.command
-        result = Result.DENIED if command and command == self.rejected else execute(command, params, self)
+        result = Result.DENIED if command and command == self._rejected else execute(command, params, self)
         self._answer(acknowledgement(command, result, heard.system, heard.component))
 
     def _set_mode(self, heard: Heard) -> None:
@@ -174,42 +176,6 @@ class Firmware:
         if isinstance(self.pilot, ArduPilot):
             kind = common.MAVLINK_MSG_ID_SET_MODE
             self._answer(acknowledgement(kind, result, heard.system, heard.component))
-
-    def _list(self, _: Heard) -> None:
-        if isinstance(self.pilot, Px4):
-            self._answer(self._parameters.hash_message(HASH))
-        self._listed = 0
-
-    def _read(self, heard: Heard) -> None:
-        """An unknown name is answered with nothing, an unknown number by PX4 with a text."""
-        name, index = heard.message.param_id, heard.message.param_index
-        found = self._parameters.find(name, index)
-        if found is not None:
-            self._answer(self._parameters.message(found), READ_NS if isinstance(self.pilot, ArduPilot) else 0)
-        elif isinstance(self.pilot, Px4) and name == HASH and index < 0:
-            self._answer(self._parameters.hash_message(HASH))
-        else:
-            self._miss(heard, f"[pm] unknown param ID: {index}" if index >= 0 else "", index)
-
-    def _miss(self, heard: Heard, text: str, index: int) -> None:
-        """There is no such parameter: say so as the firmware does."""
-        if self.tells_param_errors:
-            name = heard.message.param_id.encode()[:16]
-            error = common.MAV_PARAM_ERROR_DOES_NOT_EXIST
-            self._answer(common.MAVLink_param_error_message(heard.system, heard.component, name, index, error))
-        elif text and isinstance(self.pilot, Px4):
-            self.pilot.say(INFO, text)
-
-    def _write(self, heard: Heard) -> None:
-        message = heard.message
-        found = self._parameters.find(message.param_id, -1)
-        if isinstance(self.pilot, Px4) and message.param_id == HASH:
-            self._listed = None
-        elif found is None:
-            self._miss(heard, f"[pm] unknown param: {_plain(message.param_id)}", -1)
-        elif self._parameters.write(message.param_id, message.param_value, message.param_type):
-            told = self._parameters.echo(found, message.param_value)
-            self._answer(told, WRITE_NS if isinstance(self.pilot, ArduPilot) else 0)
 
     def _timesync(self, heard: Heard) -> None:
         if heard.message.tc1 == 0:
@@ -226,8 +192,3 @@ class Firmware:
 
     def _system_time(self, pilot: Autopilot) -> Any:
         return common.MAVLink_system_time_message(self._unix_ns(pilot.now_ns) // 1000, telemetry.boot_ms(pilot))
-
-
-def _plain(name: str) -> str:
-    """What can be shown of a name that somebody sent."""
-    return "".join(letter if letter.isalnum() or letter == "_" else "?" for letter in name[:16])

@@ -12,12 +12,13 @@ from typing import Any, ClassVar
 
 from pymavlink.dialects.v20 import common
 
-from sim_bridge.mavlink.autopilot import CRITICAL, INFO, NS_PER_S, WARNING, AttitudeTarget, Autopilot, Result
+from sim_bridge.mavlink.autopilot import Autopilot
 from sim_bridge.mavlink.estimator import SeenPose
 from sim_bridge.mavlink.frames import unit
 from sim_bridge.mavlink.guidance import Goal, Wish, towards
-from sim_bridge.mavlink.odometry import LOCAL_FRD, LOCAL_NED, pose_of_odometry, pose_of_vision
+from sim_bridge.mavlink.odometry import LOCAL_FRD, LOCAL_NED, pose_of_odometry
 from sim_bridge.mavlink.stabilizer import Gains
+from sim_bridge.mavlink.vocabulary import CRITICAL, INFO, NS_PER_S, WARNING, AttitudeTarget, Result
 
 IGNORE_RATES, IGNORE_THRUST, IGNORE_ATTITUDE = 0b111, 64, 128
 PROOF_S = 0.5
@@ -131,21 +132,13 @@ class Px4(Autopilot):
         w, x, y, z = message.q
         self.target = AttitudeTarget(unit((w, x, y, z)), thrust, self.now_ns)
 
-    def take_odometry(self, message: Any) -> None:
+    def _pose_of(self, message: Any) -> SeenPose | None:
         """Vision in LOCAL_FRD or LOCAL_NED."""
-        self._see(pose_of_odometry(message, frozenset({LOCAL_FRD, LOCAL_NED}), _ESTIMATORS))
+        return pose_of_odometry(message, frozenset({LOCAL_FRD, LOCAL_NED}), _ESTIMATORS)
 
-    def take_vision(self, message: Any) -> None:
-        """The older way."""
-        self._see(pose_of_vision(message))
-
-    def feed(self, pose: SeenPose) -> None:
-        """As if it had come as ODOMETRY."""
-        self._see(pose)
-
-    def _see(self, pose: SeenPose | None) -> None:
+    def _see(self, pose: SeenPose) -> None:
         uses = int(self.parameters["EKF2_EV_CTRL"])
-        if pose is not None and uses & POSITION and uses & HEIGHT:
+        if uses & POSITION and uses & HEIGHT:
             self.estimator.see(pose, self.now_ns, heading_too=bool(uses & HEADING), velocity_too=bool(uses & VELOCITY))
 
     def _wish(self) -> Wish:

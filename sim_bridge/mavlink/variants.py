@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from sim_bridge.mavlink.ardupilot import ArduPilot
-from sim_bridge.mavlink.autopilot import Autopilot, Setup
+from sim_bridge.mavlink.autopilot import Autopilot
 from sim_bridge.mavlink.body import Body
 from sim_bridge.mavlink.faults import spoil
 from sim_bridge.mavlink.options import Flavour, MavlinkOptions
 from sim_bridge.mavlink.parameter_tables import ARDUPILOT, ARDUPILOT_READY, PX4, PX4_READY
 from sim_bridge.mavlink.parameters import Bytewise, Cast, Parameters
 from sim_bridge.mavlink.px4 import Px4
+from sim_bridge.mavlink.vocabulary import Setup
 
 _BOOT_S: dict[Flavour, float] = {"px4": 2.0, "ardupilot": 20.0}
 _HOVER: dict[Flavour, float] = {"px4": 0.5, "ardupilot": 0.369}

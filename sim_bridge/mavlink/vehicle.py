@@ -6,6 +6,7 @@ from typing import Any
 
 from lcd_flight.model import State, Vector3, Vehicle
 from lcd_flight.model.frames import from_yaw
+from sim_bridge.mavlink.ardupilot import ArduPilot
 from sim_bridge.mavlink.body import PERIOD_NS, Body
 from sim_bridge.mavlink.codec import Codec
 from sim_bridge.mavlink.estimator import SeenPose
@@ -81,7 +82,7 @@ class SimulatedMavlink:
                 self.body.advance()
                 continue
             if self.options.own_mocap and self._periods % FED_EVERY == 0:
-                self.firmware.pilot.feed(self.seen())
+                self._show()
             self._say(self.firmware.step(self._time_ns))
             if self.firmware.reboot_ns is not None and self._time_ns >= self.firmware.reboot_ns:
                 self.reboot()
@@ -106,12 +107,19 @@ class SimulatedMavlink:
         state = self.body.state
         return SeenPose(swapped(state.p_WB), ned_attitude(state.q_WB), None, 0)
 
+    def _show(self) -> None:
+        """Its own motion capture tells it where it is; an origin comes first, where one is needed."""
+        pilot = self.firmware.pilot
+        if isinstance(pilot, ArduPilot) and pilot.origin is None:
+            pilot.set_origin(0, 0, 0)
+        pilot.feed(self.seen())
+
     def _booted(self) -> Firmware:
         pilot = boot(self.options, self.body, self.parameters, self._time_ns)
-        firmware = Firmware(pilot, self.parameters, self.options.system, self._unix_ns)
-        firmware.tells_param_errors = self.options.param_error
-        firmware.rejected = self.options.reject
-        return firmware
+        o = self.options
+        return Firmware(
+            pilot, self.parameters, self._unix_ns, system=o.system, param_error=o.param_error, rejected=o.reject
+        )
 
     def _change_key(self) -> None:
         """SETUP_SIGNING came: all zeros remove the key."""

@@ -280,6 +280,12 @@ def test_unfit_setpoints_are_dropped_in_silence(flying: Client, q: tuple[float, 
     assert not flying.texts
 
 
+def test_a_mask_that_ignores_some_rates_begins_guided_anew(flying: Client) -> None:
+    flying.fly(200, THRUST, turned(roll_deg=20.0))
+    flying.target(THRUST, turned(roll_deg=20.0), 3)
+    assert flying.pilot.target is None
+
+
 def test_setpoints_in_other_modes_are_ignored(client: Client) -> None:
     client.target(0.5)
     assert client.pilot.target is None

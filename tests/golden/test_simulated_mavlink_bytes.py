@@ -9,10 +9,10 @@ import pytest
 from virtual_mavlink import Client
 
 from sim_bridge.mavlink import telemetry
-from sim_bridge.mavlink.autopilot import Result
 from sim_bridge.mavlink.codec import Codec
 from sim_bridge.mavlink.commands import acknowledgement
 from sim_bridge.mavlink.signing import Signatures
+from sim_bridge.mavlink.vocabulary import Result
 
 HALF = math.sqrt(0.5)
 

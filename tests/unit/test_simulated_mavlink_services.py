@@ -169,6 +169,14 @@ def test_an_interval_is_set_read_back_and_ended(flavour: str) -> None:
     assert client.of("MESSAGE_INTERVAL")[-1].interval_us == -1
 
 
+@BOTH
+def test_an_interval_is_never_longer_than_can_be_told(flavour: str) -> None:
+    client = Client(flavour)
+    assert client.command(INTERVAL, ATTITUDE, 1e30) == ACCEPTED
+    assert client.command(INTERVAL_OF, ATTITUDE) == ACCEPTED
+    assert client.of("MESSAGE_INTERVAL")[-1].interval_us == 2**31 - 1
+
+
 def test_interval_zero_is_as_after_a_boot() -> None:
     client = Client()
     client.command(INTERVAL, ATTITUDE, -1)

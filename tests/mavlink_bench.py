@@ -44,6 +44,8 @@ CLOCK = VirtualClock()
 VEHICLE: Vehicle = short_mission.vehicle()
 STEP_NS = 2 * MS
 FRAME_STEPS = 5
+AGES_S = {"px4": 6.0, "ardupilot": 26.0}
+"""How long a vehicle has been on: by then its sensors have settled."""
 PEER: Peer = ("127.0.0.1", 14580)
 
 Tampers = Callable[[bytes, bool, int], "list[bytes]"]
@@ -161,7 +163,7 @@ async def bench(
     mocap_yaw_rad: float = 0.0,
     start_m: Vector3 = (0.0, 0.0, 0.0),
     yaw_rad: float = 0.0,
-    age_s: float = 30.0,
+    age_s: float | None = None,
     airframe: Vehicle = VEHICLE,
     published: list[MocapFrame] | None = None,
     **given: object,
@@ -182,8 +184,7 @@ async def bench(
         async with plugins.pose_source(endpoint, "body", CLOCK) as pose:
             context = LinkContext(airframe, CLOCK, start_m, yaw_rad, seed=3, listen_poses=pose.listen)
             made = Bench(air, pose, context, flavour, mocap_yaw_rad)
-            if age_s:
-                await wait_s(age_s)
+            await wait_s(AGES_S[flavour] if age_s is None else age_s)
 
             async def live() -> None:
                 for step in itertools.count():

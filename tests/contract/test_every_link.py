@@ -136,11 +136,11 @@ def fly_mavlink(uri: str, script: Script) -> list[MocapFrame]:
 
     async def main() -> None:
         place = {"start_m": (1.0, -2.0, 0.0), "yaw_rad": 0.5}
-        async with mavlink_bench.bench(uri.split()[1], airframe=VEHICLE, published=frames, **place) as bench:
-            async with bench.link() as link:
-                frames.clear()
-                await script(link, frames)
-                seen.extend(frames)
+        vehicle = mavlink_bench.bench(uri.split()[1], airframe=VEHICLE, published=frames, **place)
+        async with vehicle as bench, bench.link() as link:
+            frames.clear()
+            await script(link, frames)
+            seen.extend(frames)
 
     mavlink_bench.run(main)
     return seen

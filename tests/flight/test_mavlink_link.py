@@ -1,4 +1,4 @@
-"""Connecting, arming, stopping and leaving over the MAVLink link, and all ways in which that is refused, with reasons."""
+"""Connecting, arming, stopping and leaving over the MAVLink link, and all ways in which it is refused, with reasons."""
 
 from __future__ import annotations
 
@@ -233,10 +233,8 @@ def test_the_origin_comes_before_the_first_pose() -> None:
                 first_pose_ns = made.air.sent(331)[0][0]
                 sent_ns, data = made.air.sent(ORIGIN)[0]
                 assert sent_ns < first_pose_ns
-                latitude, longitude, height = (
-                    int.from_bytes(data[10 + n : 14 + n], "little", signed=True) for n in (0, 4, 8)
-                )
-                assert (latitude, longitude, height) == (-331234568, 1510000001, 12500)
+                place = [int.from_bytes(data[10 + n : 14 + n], "little", signed=True) for n in (0, 4, 8)]
+                assert place == [-331234568, 1510000001, 12500]  # rounded, not cut off
             made.air.ups.clear()
             async with made.link():  # it has one now
                 assert made.air.sent(ORIGIN) == []

@@ -125,7 +125,7 @@ class ArduPilot(Autopilot):
         return next((text for fails, text in checks if fails), "")
 
     def take_attitude(self, message: Any) -> None:
-        """Dropped in silence unless attitude and thrust are given and fit; with some of the rates GUIDED begins anew."""
+        """Dropped in silence unless attitude and thrust are given and fit; with some rates GUIDED begins anew."""
         if self.mode not in (GUIDED, GUIDED_NOGPS) or message.type_mask & ~RATES:
             return
         if message.type_mask not in (0, RATES):

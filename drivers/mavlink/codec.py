@@ -61,10 +61,9 @@ class Codec:
         self._signing.secret_key = None if key is None else key.secret
         self._signing.sign_outgoing = key is not None
 
-    @property
-    def newest_stamp(self) -> int:
-        """The signing timestamp that the next packet must not be below."""
-        return int(self._signing.timestamp)
+    def newest_stamp(self, now_ns: int) -> int:
+        """The signing timestamp below which no packet may be from now on; 0 without signing."""
+        return 0 if self._stamps is None else max(int(self._signing.timestamp), self._stamps.at(now_ns))
 
     def encode(self, message: Message, now_ns: int) -> bytes:
         """The bytes of a message with the next sequence number, signed where there is a key."""
@@ -75,7 +74,7 @@ class Codec:
         return bytes(data)
 
     def decode(self, buffer: bytearray) -> list[Message]:
-        """Take every whole message off a buffer; what is left is the beginning of one, at most 292 bytes."""
+        """Take every whole message off a buffer; what is left is the beginning of one, under 280 bytes."""
         messages: list[Message] = []
         start, end = 0, len(buffer)
         while start < end:

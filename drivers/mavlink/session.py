@@ -74,8 +74,8 @@ class Session:
 
     @property
     def newest_stamp(self) -> int:
-        """The newest signing timestamp."""
-        return self._codec.newest_stamp
+        """The signing timestamp below which no packet may be from now on."""
+        return self._codec.newest_stamp(self._clock.now_ns())
 
     def listen(self, listener: Listener) -> None:
         """Tell `listener` of every message of the vehicle from now on."""

@@ -14,6 +14,16 @@ from mavlink_bench import CLOCK, Bench, Flown, bench, flight, kind_of, run
 from lcd_flight.model import Outcome, Phase, Tick, TickInputs
 
 FLAVOURS = ["px4", "ardupilot"]
+
+pytestmark = pytest.mark.usefixtures("own_state")
+
+
+@pytest.fixture
+def own_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Signing timestamps are kept here, not among the user's own."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+
+
 SETPOINT, ODOMETRY = 82, 331
 LAND = {"px4": 4 << 16 | 6 << 24, "ardupilot": 9}
 PILOT = {"px4": ("posctl", "POSCTL"), "ardupilot": ("loiter", "LOITER")}

@@ -16,6 +16,16 @@ from drivers.mavlink.link import MavlinkLink
 from lcd_flight.model import RefusedError
 
 FLAVOURS = ["px4", "ardupilot"]
+
+pytestmark = pytest.mark.usefixtures("own_state")
+
+
+@pytest.fixture
+def own_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Signing timestamps are kept here, not among the user's own."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+
+
 SETPOINT, COMMAND, PARAM_SET, ORIGIN = 82, 76, 23, 48
 WRONG = {
     "px4": {
@@ -264,8 +274,7 @@ def test_the_mode_is_asked_for_after_a_second_of_stream_and_before_arming(flavou
 @pytest.mark.parametrize(("command", "what"), [(176, "refuses OFFBOARD"), (400, "will not arm")])
 def test_a_rejected_command_is_refused_with_its_result(command: int, what: str) -> None:
     async def main() -> None:
-        async with bench("px4", age_s=20.0) as made, made.link() as link:
-            made.vehicle.firmware.rejected = command
+        async with bench("px4", reject=command) as made, made.link() as link:
             began_ns = CLOCK.now_ns()
             text = await arming_refusal(link)
             assert what in text
@@ -323,8 +332,7 @@ def test_an_acknowledgement_for_somebody_else_is_none() -> None:
         return [bytes(other.pack(mavlink.MAVLink(None, 1, 1)))] if data[10:12] == b"\xb0\x00" else [data]
 
     async def main() -> None:
-        async with bench("px4", tampers=tampers) as made, made.link() as link:
-            made.vehicle.firmware.rejected = 176
+        async with bench("px4", tampers=tampers, reject=176) as made, made.link() as link:
             assert "no acknowledgement after 5 attempts in 2 s" in await arming_refusal(link)
 
     run(main)
@@ -512,6 +520,23 @@ def test_signing_that_does_not_agree_is_refused_with_what_was_left_out(case: str
             text = await refusal(made, f"signing=file:{key}&connect_s=2")
             assert reason in text
             assert "check the option signing and the autopilot's key" in text
+
+    run(main)
+
+
+def test_signing_goes_on_after_a_restart_though_the_clock_went_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    secret = hashlib.sha256(b"a passphrase").digest()
+    monkeypatch.setenv("TEST_KEY", "a passphrase")
+
+    async def main() -> None:
+        async with bench(key=secret) as made:
+            async with made.link("signing=env:TEST_KEY"):
+                pass
+            newest = max(int.from_bytes(data[-12:-6], "little") for _, data in made.air.ups)
+            made.air.ups.clear()
+            monkeypatch.setattr(signing, "_real_time", lambda: 0)
+            async with made.link("signing=env:TEST_KEY"):
+                assert min(int.from_bytes(data[-12:-6], "little") for _, data in made.air.ups) > newest
 
     run(main)
 

@@ -1,8 +1,7 @@
 """The MAVLink link's packets, byte by byte, from the specification: pymavlink at both ends would hide its own errors.
 
-What stands here is written from mavlink.io, "Packet Serialization" and "Message Signing", and from the message
-definitions in common.xml: a header of ten bytes, fields by size of their type, extensions last, zeros at the end left
-out, CRC-16/MCRF4XX with CRC_EXTRA, which is a checksum of the definition itself. Nothing of pymavlink is used.
+What goes out and comes in is compared with literal bytes, and those with the specification's arithmetic
+(`mavlink_specification`). Quaternions are literal too, and are checked by what they do to the nose.
 """
 
 from __future__ import annotations
@@ -15,7 +14,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+from mavlink_specification import DEFINITIONS, NUMBERS_AND_EXTRAS, crc, crc_extra, packet, signed
 
+from drivers.mavlink import arming
+from drivers.mavlink.arming import Controls
 from drivers.mavlink.codec import Codec
 from drivers.mavlink.commands import Commands
 from drivers.mavlink.frames_wire import attitude_from
@@ -28,106 +30,9 @@ from drivers.mavlink.setpoint_wire import attitude_target
 from drivers.mavlink.signing import Key, Timestamps
 from drivers.mavlink.transport import Peer, Receiver
 
-DEFINITIONS = {
-    "HEARTBEAT": "u8 type, u8 autopilot, u8 base_mode, u32 custom_mode, u8 system_status, u8 mavlink_version",
-    "PARAM_VALUE": "char[16] param_id, float param_value, u8 param_type, u16 param_count, u16 param_index",
-    "ATTITUDE_QUATERNION": "u32 time_boot_ms, float q1, float q2, float q3, float q4, float rollspeed, "
-    "float pitchspeed, float yawspeed; float[4] repr_offset_q",
-    "LOCAL_POSITION_NED": "u32 time_boot_ms, float x, float y, float z, float vx, float vy, float vz",
-    "COMMAND_LONG": "u8 target_system, u8 target_component, u16 command, u8 confirmation, float param1, float param2, "
-    "float param3, float param4, float param5, float param6, float param7",
-    "SET_ATTITUDE_TARGET": "u32 time_boot_ms, u8 target_system, u8 target_component, u8 type_mask, float[4] q, "
-    "float body_roll_rate, float body_pitch_rate, float body_yaw_rate, float thrust; float[3] thrust_body",
-    "TIMESYNC": "i64 tc1, i64 ts1; u8 target_system, u8 target_component",
-    "ODOMETRY": "u64 time_usec, u8 frame_id, u8 child_frame_id, float x, float y, float z, float[4] q, float vx, "
-    "float vy, float vz, float rollspeed, float pitchspeed, float yawspeed, float[21] pose_covariance, "
-    "float[21] velocity_covariance; u8 reset_counter, u8 estimator_type, i8 quality",
-}
-"""In the order of common.xml; after the semicolon, extensions."""
-NUMBERS_AND_EXTRAS = {
-    "HEARTBEAT": (0, 50),
-    "PARAM_VALUE": (22, 220),
-    "ATTITUDE_QUATERNION": (31, 246),
-    "LOCAL_POSITION_NED": (32, 185),
-    "COMMAND_LONG": (76, 152),
-    "SET_ATTITUDE_TARGET": (82, 49),
-    "TIMESYNC": (111, 34),
-    "ODOMETRY": (331, 91),
-}
-"""As the generated C headers publish them."""
-TYPES = {
-    "u8": ("uint8_t", "B"),
-    "i8": ("int8_t", "b"),
-    "char": ("char", "s"),
-    "u16": ("uint16_t", "H"),
-    "u32": ("uint32_t", "I"),
-    "i64": ("int64_t", "q"),
-    "u64": ("uint64_t", "Q"),
-    "float": ("float", "f"),
-}
 KEY = hashlib.sha256(b"golden").digest()
 OURS, VEHICLE = (245, 191), (1, 1)
 PEER: Peer = ("127.0.0.1", 14580)
-
-
-@dataclass(frozen=True)
-class Field:
-    name: str
-    kind: str
-    number: int
-    """Of elements; 0: not an array."""
-
-    @property
-    def layout(self) -> str:
-        return f"{self.number or ''}{TYPES[self.kind][1]}"
-
-    @property
-    def size(self) -> int:
-        return struct.calcsize(f"<{TYPES[self.kind][1]}")
-
-
-def parsed(text: str) -> list[Field]:
-    words = [pair.split() for pair in text.split(",") if pair.strip()]
-    return [Field(name, kind.partition("[")[0], int(kind.partition("[")[2].rstrip("]") or 0)) for kind, name in words]
-
-
-def fields_of(name: str) -> tuple[list[Field], list[Field]]:
-    """In the order of the wire: the largest type first, otherwise as defined; and the extensions, as defined."""
-    own, _, extensions = DEFINITIONS[name].partition(";")
-    return sorted(parsed(own), key=lambda one: -one.size), parsed(extensions)
-
-
-def crc(data: bytes) -> int:
-    """CRC-16/MCRF4XX: polynomial 0x1021 reflected, begun with all ones, bit by bit."""
-    register = 0xFFFF
-    for byte in data:
-        register ^= byte
-        for _ in range(8):
-            register = register >> 1 ^ (0x8408 if register & 1 else 0)
-    return register
-
-
-def crc_extra(name: str) -> int:
-    """The definition's checksum: name and, in the order of the wire, types, names and array lengths."""
-    told = f"{name} ".encode()
-    for one in fields_of(name)[0]:
-        told += f"{TYPES[one.kind][0]} {one.name} ".encode() + (bytes((one.number,)) if one.number else b"")
-    whole = crc(told)
-    return whole & 0xFF ^ whole >> 8
-
-
-def packet(name: str, values: dict[str, object], seq: int, source: tuple[int, int], flags: int = 0) -> bytes:
-    """One unsigned MAVLink 2 packet; what has no value is 0."""
-    own, extensions = fields_of(name)
-    payload = b""
-    for one in (*own, *extensions):
-        value = values.get(one.name, (0,) * max(one.number, 1))
-        payload += struct.pack(f"<{one.layout}", *(value if isinstance(value, tuple) else (value,)))
-    payload = payload.rstrip(b"\0") or b"\0"
-    number, _ = NUMBERS_AND_EXTRAS[name]
-    head = struct.pack("<BBBBBBB", 0xFD, len(payload), flags, 0, seq, *source) + number.to_bytes(3, "little")
-    told = head + payload
-    return told + crc(told[1:] + bytes((crc_extra(name),))).to_bytes(2, "little")
 
 
 def test_the_checksum_is_the_published_one() -> None:
@@ -310,7 +215,8 @@ def test_our_heartbeat_is_an_onboard_computers() -> None:
 def test_the_emergency_stop_is_a_forced_disarm() -> None:
     """Its confirmation, the last byte, is 0 and left out."""
     wire = Wire()
-    Commands(session(wire), Still(), OURS).tell(400, 0.0, 21196.0)
+    commands = Commands(session(wire), Still(), OURS)
+    arming.cut(Controls(Px4(), commands, Picture("enu"), Still()))
     data = bytes.fromhex(
         "fd 20 00 00 00 f5 bf 4c 00 00"
         "00 00 00 00  00 98 a5 46  00 00 00 00  00 00 00 00  00 00 00 00  00 00 00 00  00 00 00 00"
@@ -381,12 +287,6 @@ PX4_SIGNED_HEARTBEAT = bytes.fromhex(
 )
 
 
-def signed(data: bytes, link_id: int, stamp: int) -> bytes:
-    """With the first six bytes of sha256 over the key and everything before them."""
-    told = data + bytes((link_id,)) + stamp.to_bytes(6, "little")
-    return told + hashlib.sha256(KEY + told).digest()[:6]
-
-
 @pytest.fixture
 def codec(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Codec:
     monkeypatch.setattr("drivers.mavlink.signing._real_time", lambda: STAMP)
@@ -394,7 +294,7 @@ def codec(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Codec:
 
 
 def test_a_signed_packet(codec: Codec) -> None:
-    assert signed(packet("HEARTBEAT", HEARTBEAT, 0, OURS, flags=1), 0, STAMP) == OUR_SIGNED_HEARTBEAT
+    assert signed(packet("HEARTBEAT", HEARTBEAT, 0, OURS, flags=1), KEY, 0, STAMP) == OUR_SIGNED_HEARTBEAT
     wire = Wire()
     Session(wire, codec, Still(), VEHICLE).beat(0)
     assert wire.sent == [OUR_SIGNED_HEARTBEAT]
@@ -403,7 +303,7 @@ def test_a_signed_packet(codec: Codec) -> None:
 def test_a_signed_packet_is_believed_once_and_only_whole(codec: Codec) -> None:
     told = {"type": 2, "autopilot": 12, "base_mode": 0x81, "custom_mode": 6 << 16, "system_status": 4}
     unsigned = packet("HEARTBEAT", {**told, "mavlink_version": 3}, 9, VEHICLE, flags=1)
-    assert signed(unsigned, 2, STAMP) == PX4_SIGNED_HEARTBEAT
+    assert signed(unsigned, KEY, 2, STAMP) == PX4_SIGNED_HEARTBEAT
     forged = bytearray(PX4_SIGNED_HEARTBEAT)
     forged[-1] ^= 1
     later = bytearray(PX4_SIGNED_HEARTBEAT)

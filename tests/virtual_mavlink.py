@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import msgspec
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from lcd_flight.model import State
@@ -67,6 +68,10 @@ class Client:
             else:
                 texts.append(message.text)
         return texts
+
+    def go_blind(self) -> None:
+        """Its own motion capture stops."""
+        self.vehicle.options = msgspec.structs.replace(self.vehicle.options, own_mocap=False)
 
     def of(self, kind: str) -> list[Any]:
         """Messages of a kind that were heard."""

@@ -200,10 +200,8 @@ class Px4(Autopilot):
         mode = _AFTER_LOSS.get(action)
         if mode is None:
             self.disarm("Failsafe: termination")
-            return
-        if mode in _PLACED and not self.has_position:
-            mode = LAND
-        self._enter(mode)
+        else:
+            self._enter(mode)
 
     def _lose_position(self) -> None:
         """A mode that needs a position ends without one: it comes down level."""

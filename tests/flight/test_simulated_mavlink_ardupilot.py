@@ -105,6 +105,15 @@ def test_other_odometry_is_ignored_without_a_word(blind: Client, wrong: dict[str
     assert not blind.texts
 
 
+def test_an_origin_is_set_once(blind: Client) -> None:
+    set_origin(blind)
+    blind.send(common.MAVLink_set_gps_global_origin_message(1, 1, 1, 1))
+    blind.send(common.MAVLink_set_gps_global_origin_message(1, 2**31 - 1, 0, 0))
+    assert blind.pilot.origin == (473977420, 85455940, 488000)
+    blind.wait(20)
+    assert [origin.latitude for origin in blind.of("GPS_GLOBAL_ORIGIN")] == [473977420]
+
+
 def test_odometry_below_4_hz_refuses_arming(blind: Client) -> None:
     set_origin(blind)
     blind.watch(5000, rate_hz=50.0)
@@ -130,7 +139,7 @@ def test_the_failsafe_comes_eight_seconds_after_poses_stop() -> None:
     client = Client("ardupilot")
     client.take_off()
     client.mode(GUIDED)
-    client.vehicle.options = type(client.vehicle.options)(flavour="ardupilot")
+    client.go_blind()
     client.fly(7800, THRUST)
     assert client.pilot.mode == GUIDED
     client.fly(400, THRUST)

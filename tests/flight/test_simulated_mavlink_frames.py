@@ -102,6 +102,25 @@ def test_a_pose_frame_that_is_not_north_aligned_turns_the_setpoints_with_it(flav
     assert abs(north) < 0.5 * east
 
 
+@BOTH
+def test_a_setpoint_for_another_frame_than_the_poses_leads_elsewhere(flavour: str) -> None:
+    """Poses by one map, setpoints by another, a quarter turn off: 'forward' becomes sideways."""
+    client = Client(flavour, own_mocap=False, yaw_rad=0.0)
+    if flavour == "ardupilot":
+        origin(client)
+    for _ in range(200):
+        see_in_east_frame(client)
+        client.wait(20)
+    fly_seen(client, 60, 0.0)
+    client.mode(6 << 16 if flavour == "px4" else 20)
+    assert client.command(400, 1) == 0
+    hover, east = HOVER[flavour], turned(yaw_deg=90.0)
+    fly_seen(client, 125, 0.0)
+    fly_seen(client, 25, 1.2 * hover)
+    fly_seen(client, 150, hover, east)
+    assert abs(yaw_of(client.state.q_WB)) == pytest.approx(math.pi / 2, abs=0.1), "it turned away from where it looked"
+
+
 def origin(client: Client) -> None:
     from pymavlink.dialects.v20 import common
 

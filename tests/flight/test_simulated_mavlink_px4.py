@@ -196,6 +196,29 @@ def test_disarming_in_the_air_is_refused_unless_forced(flying: Client) -> None:
     assert not flying.pilot.armed
 
 
+def test_without_poses_a_mode_that_needs_a_position_ends_after_five_seconds(flying: Client) -> None:
+    flying.mode(PX4_LOITER)
+    flying.go_blind()
+    flying.wait(4900)
+    assert flying.pilot.mode == PX4_LOITER
+    flying.wait(300)
+    assert flying.pilot.mode == PX4_LAND
+    assert flying.texts[-1] == "Failsafe activated: position estimate invalid"
+    flying.wait(10_000)
+    assert not flying.pilot.armed
+
+
+def test_offboard_with_attitudes_needs_no_position(flying: Client) -> None:
+    flying.go_blind()
+    flying.fly(6000, 0.5)
+    assert flying.pilot.mode == PX4_OFFBOARD
+
+
+def test_a_pilot_who_flies_by_hand_may_disarm_in_the_air(flying: Client) -> None:
+    flying.mode(STABILIZED)
+    assert flying.command(ARM, 0) == ACCEPTED
+
+
 def test_the_pilot_takes_over(flying: Client) -> None:
     flying.pilot.request_mode(PX4_POSCTL)
     flying.fly(200, 0.9, turned(roll_deg=30.0))

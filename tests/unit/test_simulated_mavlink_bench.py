@@ -291,6 +291,21 @@ def test_motion_capture_may_point_elsewhere() -> None:
     assert abs(frame.quaternion[3]) == pytest.approx(1.0, abs=1e-3)
 
 
+def test_velocities_are_turned_too_and_body_rates_are_not() -> None:
+    view = MocapView(MavlinkOptions(mocap_yaw_deg=90.0), "body", 0)
+    seen = view.seen(State((0.0, 0.0, 0.0), (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0), (4.0, 5.0, 6.0)))
+    assert seen.v_WB_W == pytest.approx((2.0, -1.0, 3.0))
+    assert seen.w_WB_B == (4.0, 5.0, 6.0)
+
+
+def test_a_crash_is_told() -> None:
+    line = Line(flavour="ardupilot")
+    line.arm()
+    line.bench.vehicle.body.broken = True
+    line.wait(100)
+    assert line.said[-1] == "hit the floor, tilted by 0 deg"
+
+
 def test_what_is_under_way_is_bounded() -> None:
     way = Way(MavlinkOptions(delay_ms=1000.0), 0)
     for number in range(MOST_UNDER_WAY + 100):

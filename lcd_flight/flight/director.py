@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from lcd_flight.flight.hand_check import HandCheck, watched
 from lcd_flight.flight.loop import Condition, FlightLoop
 from lcd_flight.flight.operator import Operator
+from lcd_flight.flight.phases import TIME_LIMITS_S
 from lcd_flight.flight.progress import ByHand, Checked, Progress
 from lcd_flight.flight.setup import FlightSetup
 from lcd_flight.flight.tick import EXPIRED
@@ -149,6 +150,8 @@ class Director:
             self._loop.order(Command.LAND)
             await self._loop.in_phase(Phase.IDLE)
             raise
+        if self._loop.memory.phase is not Phase.ARMED:  # it took too long; its disarming is what was waited for
+            raise RefusedError(f"the vehicle was not armed within {TIME_LIMITS_S[Phase.ARMED]:g} s")
         self._loop.order(Command.TAKEOFF)
         await self._on_ground(lambda _, decided: decided.phase.airborne)
 

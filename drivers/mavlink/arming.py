@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers.mavlink.autopilot import Autopilot
-from drivers.mavlink.commands import ACCEPTED, Commands, result_name
+from drivers.mavlink.commands import ACCEPTED, NO_ANSWER, Commands, result_name
 from drivers.mavlink.dialect import mavlink
 from drivers.mavlink.picture import Picture
 from drivers.mavlink.waiting import pause, until
@@ -14,9 +14,8 @@ from lcd_flight.model import Clock, RefusedError
 
 CONFIRM_S = 1.5
 """For the heartbeat that shows it: one a second at the least."""
-MODE_LIMIT_S = 4.0
-ARM_LIMIT_S = 4.0
-"""Arming that is refused is asked for again each second; within the flight's own limit of 10 s."""
+LIMIT_S = 3.0
+"""What is refused is asked for again each second until then: sensors may still settle, a stream be too young."""
 RETRY_S = 1.0
 LAND_LIMIT_S = 8.0
 """A vehicle on the ground disarms by itself 2 to 4 s after it was told to land."""
@@ -46,15 +45,16 @@ async def enter_mode(controls: Controls, mode: int) -> None:
         RefusedError: it will not, with its reason.
     """
     picture, clock, name = controls.picture, controls.clock, controls.autopilot.mode_name(mode)
-    deadline_ns, result = clock.now_ns() + round(MODE_LIMIT_S * 1e9), ACCEPTED
+    deadline_ns, result = clock.now_ns() + round(LIMIT_S * 1e9), ACCEPTED
     while clock.now_ns() < deadline_ns:
         result = await controls.commands.ask(_SET_MODE, *controls.autopilot.mode_command(mode))
         if result == ACCEPTED and await until(clock, lambda: picture.custom_mode == mode, CONFIRM_S):
             return
         if picture.custom_mode == mode:  # the acknowledgement was lost, the change was not
             return
-        if result != ACCEPTED:
-            await pause(clock, RETRY_S)
+        if result == NO_ANSWER:
+            break
+        await pause(clock, RETRY_S if result != ACCEPTED else 0.0)
     if result == ACCEPTED:
         now = "none" if picture.custom_mode is None else controls.autopilot.mode_name(picture.custom_mode)
         raise RefusedError(f"the autopilot took the change to {name} but stays in {now}: is a remote control on?")
@@ -62,19 +62,21 @@ async def enter_mode(controls: Controls, mode: int) -> None:
 
 
 async def arm(controls: Controls) -> None:
-    """Arm, and see it armed; what it refuses is asked for again each second, since sensors may still settle.
+    """Arm in the mode that takes setpoints, and see it armed.
 
     Raises:
         RefusedError: it will not, with its reason.
     """
     picture, clock = controls.picture, controls.clock
-    deadline_ns, result = clock.now_ns() + round(ARM_LIMIT_S * 1e9), ACCEPTED
+    deadline_ns, result = clock.now_ns() + round(LIMIT_S * 1e9), ACCEPTED
     while clock.now_ns() < deadline_ns:
+        _require_mode(controls)
         result = await controls.commands.ask(_ARM, 1.0)
         if (result == ACCEPTED or picture.armed) and await until(clock, lambda: picture.armed is True, CONFIRM_S):
             return
-        if result != ACCEPTED:
-            await pause(clock, RETRY_S)
+        if result == NO_ANSWER:
+            break
+        await pause(clock, RETRY_S if result != ACCEPTED else 0.0)
     if result == ACCEPTED:
         raise RefusedError("the autopilot took the order to arm but stays disarmed: look at its messages")
     raise RefusedError(f"the autopilot will not arm: {controls.reason(result)}")
@@ -111,9 +113,25 @@ async def land(controls: Controls) -> bool:
     return True
 
 
+def disarm_once(controls: Controls) -> None:
+    """One order to disarm, which is refused in the air; nothing is waited for."""
+    controls.commands.tell(_ARM, 0.0)
+
+
 def cut(controls: Controls) -> None:
     """One forced disarm, in the air too; nothing is waited for."""
     controls.commands.tell(_ARM, 0.0, FORCED)
+
+
+def _require_mode(controls: Controls) -> None:
+    """Refuse to arm in a mode that somebody else has chosen meanwhile.
+
+    Raises:
+        RefusedError: so it is.
+    """
+    mode, autopilot = controls.picture.custom_mode, controls.autopilot
+    if mode is not None and mode != autopilot.flight_mode:
+        raise RefusedError(f"the mode was changed to {autopilot.mode_name(mode)} while arming: somebody else has it")
 
 
 async def _lands(controls: Controls) -> bool:

@@ -28,8 +28,12 @@ from lcd_flight.model.frames import from_yaw, yaw_of
 
 STREAM_S = 1.2
 """Of setpoints before the autopilot is asked for its mode; it wants one second."""
-DESCENT_S = 30.0
-"""So long poses go on to a vehicle that lands by itself while the link closes."""
+ARMING_S = 9.0
+"""For all of arming; the flight itself gives up after 10 s."""
+POSES_S = 60.0
+"""So long poses go on, while the link closes, to a vehicle that lands by itself or that the pilot flies."""
+HEARTBEAT_LOST_NS = 3_500_000_000
+"""Three heartbeats at the slowest: who has the vehicle cannot be seen any more, whatever else is heard."""
 STOP_S = 1.0
 """So long closing goes on repeating an emergency stop that is not confirmed."""
 RAMP_SHARE = 0.25
@@ -121,12 +125,12 @@ class MavlinkLink:
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Leave a vehicle in the air to its own LAND mode and its poses until it is down; then close."""
+        """Leave a vehicle in the air to its own LAND mode, or to who took over; its poses go on until it is down."""
         picture = self._contact.picture
         try:
             if self._outbox.latched:
                 await until(self._clock, lambda: picture.armed is False, STOP_S)
-            elif picture.armed and not self._outbox.over:
+            elif picture.armed:
                 await self._leave()
         finally:
             await self._close()
@@ -150,13 +154,18 @@ class MavlinkLink:
         self._idle_thrust = 0.0
         self._outbox.idle(self._clock.now_ns())
         try:
-            await pause(self._clock, STREAM_S)
-            await arming.enter_mode(self._controls, mode)
-            await arming.arm(self._controls)
-            await self._bring_motors_up()
+            async with asyncio.timeout(ARMING_S):
+                await pause(self._clock, STREAM_S)
+                await arming.enter_mode(self._controls, mode)
+                await arming.arm(self._controls)
+                await self._bring_motors_up()
             self._custody.require_armed_in(mode, self._clock.now_ns())
-        except BaseException:
+        except BaseException as error:
+            if self._contact.picture.armed and self._custody.may_be_cut():
+                arming.disarm_once(self._controls)
             self._outbox.rest(self._clock.now_ns())
+            if isinstance(error, TimeoutError):
+                raise RefusedError(f"arming took longer than {ARMING_S:g} s{self._contact.said()}") from None
             raise
         self._outbox.ready(self._clock.now_ns())
 
@@ -210,7 +219,7 @@ class MavlinkLink:
         self._transmitted.clear()
         return LinkReport(
             connected=self._tending is not None,
-            age_ns=None if session.newest_ns is None else max(now_ns - session.newest_ns, 0),
+            age_ns=self._age_ns(now_ns),
             sent=self._sent,
             received=session.losses.received,
             lost=session.losses.lost,
@@ -221,6 +230,14 @@ class MavlinkLink:
             transmitted=transmitted,
             telemetry=picture.telemetry(now_ns=now_ns, lost=self._custody.lost),
         )
+
+    def _age_ns(self, now_ns: int) -> int | None:
+        """Since the vehicle's newest packet; since its newest heartbeat, where that is missing."""
+        newest_ns, heartbeat_ns = self._contact.session.newest_ns, self._contact.picture.heartbeat_ns
+        if newest_ns is None or heartbeat_ns is None:
+            return None
+        silent_ns = now_ns - heartbeat_ns
+        return silent_ns if silent_ns > HEARTBEAT_LOST_NS else max(now_ns - newest_ns, 0)
 
     async def _bring_motors_up(self) -> None:
         """Wait until the motors take thrust; where they come up with the first one only, give a little of it."""
@@ -297,16 +314,17 @@ class MavlinkLink:
         return pose is not None and pose.p_WB[2] > self._context.initial_position_m[2] + FLYING_M
 
     async def _leave(self) -> None:
-        """Have a vehicle that is still armed land by itself, or disarm where it stands."""
+        """Have a vehicle that is still armed land by itself, or disarm where it stands; its poses go on meanwhile."""
         picture = self._contact.picture
-        if not self._airborne():
+        if not (self._outbox.over or self._airborne()):
             with contextlib.suppress(RefusedError):
                 await self.disarm()
             return
-        self._custody.landing = True
-        self._outbox.land(self._clock.now_ns())
-        if await arming.land(self._controls):
-            await until(self._clock, lambda: picture.armed is False or self._outbox.over, DESCENT_S)
+        if not self._outbox.over:
+            self._custody.landing = True
+            self._outbox.land(self._clock.now_ns())
+            await arming.land(self._controls)
+        await until(self._clock, lambda: picture.armed is False, POSES_S)
 
     async def _close(self) -> None:
         """Stop tending and close; no task is left."""

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from mavlink_bench import CLOCK, Bench, Flown, bench, flight, kind_of, run
 
+from drivers.mavlink import link
 from lcd_flight.model import Outcome, Phase, Tick, TickInputs
 
 FLAVOURS = ["px4", "ardupilot"]
@@ -20,8 +21,9 @@ pytestmark = pytest.mark.usefixtures("own_state")
 
 @pytest.fixture
 def own_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Signing timestamps are kept here, not among the user's own."""
+    """Signing timestamps are kept here, not among the user's own; who took over gets poses for a moment only."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setattr(link, "POSES_S", 8.0)
 
 
 SETPOINT, ODOMETRY = 82, 331
@@ -234,6 +236,39 @@ def test_a_heartbeat_of_another_system_and_a_flood_of_rubbish_change_nothing() -
         made.air.deliver(bytes.fromhex("fd09000000070100000004000000020c5804033a63"), ("10.0.0.9", 5))
 
     assert flown("px4", act=act).outcome is Outcome.LANDED
+
+
+def test_heartbeats_that_stay_away_are_a_lost_link_whatever_else_is_heard() -> None:
+    """Without them nobody sees whether the pilot has taken over. Three of the slowest are waited for."""
+
+    def tampers(data: bytes, up: bool, now_ns: int) -> list[bytes]:
+        return [] if not up and kind_of(data) == 0 and now_ns >= begins[0] else [data]
+
+    begins = [1 << 62]
+
+    def begin(_made: Bench) -> None:
+        begins[0] = CLOCK.now_ns()
+
+    done = flown("px4", act=Once(Phase.TAKEOFF, 0.5, begin), tampers=tampers)
+    seen = done.first("link_lost")
+    assert 3.4e9 < seen.now_ns - begins[0] < 3.6e9
+    assert Phase.LAND_NOW in done.listener.phases
+    assert done.outcome is Outcome.ABORTED
+
+
+def test_poses_go_on_to_the_pilot_who_flies_until_the_vehicle_is_disarmed() -> None:
+    take = Once(Phase.TRACK, 0.5, lambda made: switch(made, "land"))
+
+    def check(made: Bench, done: Flown) -> None:
+        assert not made.armed
+        assert made.height_m < 0.02
+        assert take.at_ns is not None
+        over_ns = done.listener.flight[-1][0].now_ns
+        assert len(made.air.sent(ODOMETRY, over_ns)) > 50
+        assert made.air.sent(SETPOINT, over_ns) == []
+
+    done = flown("ardupilot", act=take, check=check)
+    assert done.reason == "the pilot took over: mode LAND"
 
 
 def test_a_restart_in_the_air_is_a_crash() -> None:

@@ -348,6 +348,85 @@ def test_ardupilot_that_has_just_booted_is_waited_for() -> None:
     run(main)
 
 
+def test_a_pilot_who_changes_the_mode_while_it_arms_is_not_armed_against() -> None:
+    """The mode is changed between its confirmation and arming, again and again: it is told, and not entered again."""
+
+    def tampers(data: bytes, up: bool, _now_ns: int) -> list[bytes]:
+        if up and kind_of(data) == COMMAND and data[38:40] == b"\x90\x01":
+            orders.append(data)
+            if len(orders) == 1:
+                return []
+        return [data]
+
+    orders: list[bytes] = []
+
+    async def main() -> None:
+        async with bench("ardupilot", tampers=tampers, reject=400) as made, made.link() as link:
+            arming = asyncio.create_task(arming_refusal(link))
+            while not orders:
+                await wait_s(0.01)
+            made.vehicle.firmware.pilot.mode = 5
+            text = await arming
+            assert text == "the mode was changed to LOITER while arming: somebody else has it"
+            assert len(commands(made, 176)) == 1
+            assert not made.armed
+
+    run(main)
+
+
+def test_a_pilot_who_takes_over_while_the_motors_come_up_has_it() -> None:
+    async def main() -> None:
+        async with bench("ardupilot", rc=True) as made, made.link() as link:
+            arming = asyncio.create_task(arming_refusal(link))
+            while not made.armed:
+                await wait_s(0.01)
+            await wait_s(0.5)
+            made.vehicle.firmware.pilot.mode = 0
+            assert (await arming).startswith("the pilot took over: mode STABILIZE")
+            assert link.report(CLOCK.now_ns()).taken_over == "the pilot took over: mode STABILIZE"
+            count = len(commands(made, 400))
+            await link.disarm()
+            link.stop_motors()
+            await wait_s(0.2)
+            assert len(commands(made, 400)) == count
+            assert made.armed
+            made.vehicle.firmware.pilot.disarm()
+
+    run(main)
+
+
+def test_arming_that_takes_too_long_ends_disarmed() -> None:
+    """Every acknowledgement but the first word of progress is lost, and the heartbeat keeps still."""
+
+    def tampers(data: bytes, up: bool, _now_ns: int) -> list[bytes]:
+        if not up and kind_of(data) == 77 and data[10:12] == b"\x90\x01":
+            progress = mavlink.MAVLink_command_ack_message(400, mavlink.MAV_RESULT_IN_PROGRESS, 0, 0, 245, 191)
+            return [bytes(progress.pack(mavlink.MAVLink(None, 1, 1)))]
+        return [data]
+
+    async def main() -> None:
+        async with bench("px4", tampers=tampers, reject=400) as made, made.link() as link:
+            began_ns = CLOCK.now_ns()
+            text = await arming_refusal(link)
+            assert text.startswith("arming took longer than 9 s") or "no acknowledgement" in text
+            assert CLOCK.now_ns() - began_ns < 9.1e9
+            assert not made.armed
+
+    run(main)
+
+
+def test_the_mode_without_position_flies_too() -> None:
+    async def main() -> None:
+        async with bench("ardupilot") as made, made.link("mode=guided_nogps") as link:
+            await link.arm()
+            assert made.mode == 20
+            await stream(link, level(1.2), 0.6)
+            assert made.height_m > 0.1
+            link.stop_motors()
+
+    run(main)
+
+
 def test_why_it_does_not_arm_is_quoted() -> None:
     async def main() -> None:
         async with bench("ardupilot") as made, made.link() as link:

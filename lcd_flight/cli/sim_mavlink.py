@@ -35,8 +35,9 @@ def mavlink(
     boot: Annotated[float | None, typer.Option(help="s until it can be armed; 2, ArduPilot 20.", min=0.0)] = None,
     defaults: Annotated[str, typer.Option(help="Parameters: ready for external poses, or factory.")] = "ready",
     key_file: Annotated[str | None, typer.Option(help="Signing key; or LCD_MAVLINK_KEY.")] = None,
-    fault: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=VALUE", help="A fault; may be given again (docs).")
+    extra: Annotated[
+        list[str] | None,
+        typer.Option("--with", metavar="NAME=VALUE", help="A fault or another option of the vehicle, see the docs."),
     ] = None,
     seed: Annotated[int, typer.Option(help="Of noise and faults.")] = 0,
     seconds: Annotated[float | None, typer.Option(help="End by itself after so long.", min=0.0)] = None,
@@ -58,7 +59,7 @@ def mavlink(
         "key_file": key_file,
     }
     address = f"{'tcp:' if tcp else ''}{host}:{_port(port, tcp)}"
-    told = serve("mavlink", address, {**_as_text(options), **_faults(fault or [])}, bench, terminal, seconds)
+    told = serve("mavlink", address, {**_as_text(options), **_extras(extra or [])}, bench, terminal, seconds)
     return terminal.finish(Outcome.OK, told)
 
 
@@ -77,9 +78,9 @@ def _flavour_of(mission: str | None) -> str:
     return parse_qs(urlsplit(uri).query).get("autopilot", ["px4"])[0]
 
 
-def _faults(given: list[str]) -> dict[str, str]:
+def _extras(given: list[str]) -> dict[str, str]:
     """`NAME=VALUE` by name; what has no value is refused as an unknown option further on."""
-    return {name: value for name, _, value in (fault.partition("=") for fault in given)}
+    return {name: value for name, _, value in (pair.partition("=") for pair in given)}
 
 
 def _as_text(options: dict[str, Any]) -> dict[str, str]:

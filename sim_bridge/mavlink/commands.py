@@ -1,4 +1,4 @@
-"""COMMAND_LONG and COMMAND_INT: what is done about each, and with which result it is acknowledged.
+"""Commands: what is done about each, and with which result.
 
 Sources: mavlink.io, "Command Protocol"; PX4 1.16, Commander.cpp, mavlink_receiver.cpp; ArduPilot 4.6, GCS_Common.cpp.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 from pymavlink.dialects.v20 import common
 
@@ -52,11 +52,6 @@ def execute(command: int, params: Params, desk: Desk) -> Result:
     """Do it. params: the seven, of which those that are whole numbers come as floats too."""
     act = _ACTS.get(command)
     return Result.UNSUPPORTED if act is None else act(params, desk)
-
-
-def acknowledgement(command: int, result: Result, system: int, component: int) -> Any:
-    """COMMAND_ACK to whoever commanded."""
-    return common.MAVLink_command_ack_message(command, result, 0, 0, system, component)
 
 
 def _arm(params: Params, desk: Desk) -> Result:

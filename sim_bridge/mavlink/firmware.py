@@ -13,7 +13,7 @@ from sim_bridge.mavlink import telemetry
 from sim_bridge.mavlink.ardupilot import ArduPilot
 from sim_bridge.mavlink.autopilot import Autopilot
 from sim_bridge.mavlink.codec import Heard
-from sim_bridge.mavlink.commands import acknowledgement, execute
+from sim_bridge.mavlink.command_service import CommandService, Reluctance, acknowledgement
 from sim_bridge.mavlink.parameter_service import ParameterService
 from sim_bridge.mavlink.parameters import Parameters
 from sim_bridge.mavlink.px4 import Px4
@@ -40,13 +40,14 @@ class Firmware:
         unix_ns: Callable[[int], int],
         *,
         system: int,
-        param_error: bool = False,
-        rejected: int = 0,
+        param_error: bool,
+        reluctance: Reluctance,
     ) -> None:
-        """param_error: whether it has PARAM_ERROR. rejected: a command that is denied whatever it asks for, a fault."""
+        """param_error: whether it has PARAM_ERROR."""
         self.pilot = pilot
         self._parameters = ParameterService(parameters, pilot, self._answer, param_error)
-        self._system, self._rejected = system, rejected
+        self._commands = CommandService(self, self._answer, reluctance)
+        self._system = system
         self._unix_ns = unix_ns
         px4 = isinstance(pilot, Px4)
         self._builders = dict(telemetry.PX4_BUILDERS if px4 else telemetry.ARDUPILOT_BUILDERS)
@@ -62,8 +63,8 @@ class Firmware:
         self.key: bytes | None = None
         """A key that came in SETUP_SIGNING; all zeros remove the one there is."""
         self._acts: dict[int, Callable[[Heard], None]] = {
-            common.MAVLINK_MSG_ID_COMMAND_LONG: self._command_long,
-            common.MAVLINK_MSG_ID_COMMAND_INT: self._command_int,
+            common.MAVLINK_MSG_ID_COMMAND_LONG: self._commands.take_long,
+            common.MAVLINK_MSG_ID_COMMAND_INT: self._commands.take_int,
             common.MAVLINK_MSG_ID_SET_MODE: self._set_mode,
             common.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: self._parameters.list_all,
             common.MAVLINK_MSG_ID_PARAM_REQUEST_READ: self._parameters.read,
@@ -88,6 +89,7 @@ class Firmware:
     def step(self, now_ns: int) -> list[Any]:
         """Live one period; the messages that go out."""
         self.pilot.step(now_ns)
+        self._commands.finish(now_ns)
         due = [kind for kind, due_ns in self._due.items() if due_ns <= now_ns]
         for kind in due:
             self._due[kind] += self._intervals[kind] * (1 + (now_ns - self._due[kind]) // self._intervals[kind])
@@ -154,19 +156,6 @@ class Firmware:
                 part = data[start : start + LONGEST_TEXT]
                 messages.append(common.MAVLink_statustext_message(severity, part, number, piece))
         return messages
-
-    def _command_long(self, heard: Heard) -> None:
-        m = heard.message
-        self._command(heard, (m.param1, m.param2, m.param3, m.param4, m.param5, m.param6, m.param7))
-
-    def _command_int(self, heard: Heard) -> None:
-        m = heard.message
-        self._command(heard, (m.param1, m.param2, m.param3, m.param4, float(m.x), float(m.y), m.z))
-
-    def _command(self, heard: Heard, params: tuple[float, ...]) -> None:
-        command = heard.message.command
-        result = Result.DENIED if command and command == self._rejected else execute(command, params, self)
-        self._answer(acknowledgement(command, result, heard.system, heard.component))
 
     def _set_mode(self, heard: Heard) -> None:
         """The older way; not acknowledged by PX4, by ArduPilot with a COMMAND_ACK of message 11."""

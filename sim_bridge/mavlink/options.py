@@ -71,6 +71,10 @@ class MavlinkOptions(msgspec.Struct, frozen=True):
     """Command whose first acknowledgement is lost; 0: none."""
     reject: Annotated[int, msgspec.Meta(ge=0, le=65535)] = 0
     """Command that is always rejected: DENIED; 0: none."""
+    busy: Annotated[int, msgspec.Meta(ge=0, le=65535)] = 0
+    """Command that is TEMPORARILY_REJECTED the first time; 0: none."""
+    slow: Annotated[int, msgspec.Meta(ge=0, le=65535)] = 0
+    """Command that is IN_PROGRESS for a second before it is done; 0: none."""
     wrong: str = ""
     """Parameters with other values, `NAME:VALUE,NAME:VALUE`."""
     stuck: str = ""

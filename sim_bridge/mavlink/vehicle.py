@@ -9,6 +9,7 @@ from lcd_flight.model.frames import from_yaw
 from sim_bridge.mavlink.ardupilot import ArduPilot
 from sim_bridge.mavlink.body import PERIOD_NS, Body
 from sim_bridge.mavlink.codec import Codec
+from sim_bridge.mavlink.command_service import Reluctance
 from sim_bridge.mavlink.estimator import SeenPose
 from sim_bridge.mavlink.firmware import Firmware
 from sim_bridge.mavlink.frames import ned_attitude, swapped
@@ -49,6 +50,7 @@ class SimulatedMavlink:
         self._codec = Codec(options.system, 1, Signatures(key, options.unsigned))
         self._time_ns = self._periods = 0
         self._outgoing: list[bytes] = []
+        self._reluctance = Reluctance(options.reject, options.busy, options.slow)
         self.firmware = self._booted()
         self.alive = True
         """Whether there is any power; without, nothing runs and nothing is heard of it."""
@@ -116,9 +118,13 @@ class SimulatedMavlink:
 
     def _booted(self) -> Firmware:
         pilot = boot(self.options, self.body, self.parameters, self._time_ns)
-        o = self.options
         return Firmware(
-            pilot, self.parameters, self._unix_ns, system=o.system, param_error=o.param_error, rejected=o.reject
+            pilot,
+            self.parameters,
+            self._unix_ns,
+            system=self.options.system,
+            param_error=self.options.param_error,
+            reluctance=self._reluctance,
         )
 
     def _change_key(self) -> None:

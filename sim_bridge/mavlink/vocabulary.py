@@ -20,6 +20,7 @@ class Result(IntEnum):
     DENIED = 2
     UNSUPPORTED = 3
     FAILED = 4
+    IN_PROGRESS = 5
 
 
 @dataclass(frozen=True, slots=True)

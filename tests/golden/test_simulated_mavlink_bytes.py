@@ -10,7 +10,7 @@ from virtual_mavlink import Client
 
 from sim_bridge.mavlink import telemetry
 from sim_bridge.mavlink.codec import Codec
-from sim_bridge.mavlink.commands import acknowledgement
+from sim_bridge.mavlink.command_service import acknowledgement
 from sim_bridge.mavlink.signing import Signatures
 from sim_bridge.mavlink.vocabulary import Result
 

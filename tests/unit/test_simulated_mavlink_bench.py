@@ -165,6 +165,21 @@ def test_a_command_is_rejected_over_a_reboot() -> None:
     assert line.command(ARM, 1, 21196) == [2]
 
 
+def test_a_command_is_temporarily_rejected_once() -> None:
+    line = Line(busy=512)
+    assert [line.command(512, VERSION) for _ in range(2)] == [[1], [0]]
+
+
+def test_a_command_is_in_progress_before_it_is_done() -> None:
+    line = Line(slow=512)
+    assert line.command(512, VERSION) == [5]
+    line.wait(900)
+    assert not line.of("AUTOPILOT_VERSION")
+    line.wait(100)
+    assert line.of("AUTOPILOT_VERSION")
+    assert [ack.result for ack in line.of("COMMAND_ACK")] == [5, 0]
+
+
 def test_parameters_are_wrong() -> None:
     line = Line(wrong="COM_OBL_RC_ACT:0,COM_OF_LOSS_T:3.5")
     assert line.bench.vehicle.parameters["COM_OBL_RC_ACT"] == 0

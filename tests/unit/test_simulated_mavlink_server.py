@@ -218,8 +218,8 @@ class TestCommand:
         ("arguments", "error"),
         [
             (("--flavour", "betaflight"), "flavour=betaflight"),
-            (("--fault", "speed=2"), "unknown option speed=2"),
-            (("--fault", "wrong=NO_SUCH:1"), "no parameter 'NO_SUCH'"),
+            (("--with", "speed=2"), "unknown option speed=2"),
+            (("--with", "wrong=NO_SUCH:1"), "no parameter 'NO_SUCH'"),
             (("--vehicle", "zeppelin"), "zeppelin"),
             (("no-such-mission.yaml",), "no-such-mission.yaml"),
         ],

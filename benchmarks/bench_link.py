@@ -1,8 +1,8 @@
-"""What the Crazyflie link costs a tick, against cflib's own calls in the same run, and how late its reports are.
+"""What the links cost a tick, against their peers' own calls in the same run. MAVLink: `link_mavlink`.
 
-Both sides send to a UDP socket that swallows everything. Ours hands a packet to its sender thread and goes on; cflib's
-`send_setpoint` and `send_extpose` go through to the socket. The hand-off is timed from the driver's queue to the event
-loop, with cflib's threads in between.
+Crazyflie: both sides send to a UDP socket that swallows everything. Ours hands a packet to its sender thread and goes
+on; cflib's `send_setpoint` and `send_extpose` go through to the socket. How late reports are is timed from the driver's
+queue to the event loop, with cflib's threads in between.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -18,9 +17,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import numpy as np
 from cflib.crtp.crtpstack import CRTPPacket
 
+from benchmarks import link_mavlink
+from benchmarks.timing import PERIOD_S, SHARES, as_in_flight, paced, row
 from drivers.crazyflie import crtp_wire
 from drivers.crazyflie.outbox import Outbox
 from drivers.crazyflie.sender import Sender
@@ -34,11 +34,7 @@ from lcd_flight.worlds import load_vehicle
 ROUNDS = 5
 SENDS = 200
 """Of each side in each round."""
-PERIOD_S = 0.002
-"""A flight's is 10 ms; faster here, to be done in seconds."""
 REPORTS = 500
-SWITCH_INTERVAL_S = 2e-4
-"""As the flight loop sets it."""
 
 CLOCK = RealClock()
 ATTITUDE = from_yaw(0.3)
@@ -48,31 +44,27 @@ def rows(report: Callable[[str], None]) -> list[dict[str, Any]]:
     """Costs in microseconds."""
     ours: dict[str, list[float]] = {"setpoint": [], "pose": []}
     cflib: dict[str, list[float]] = {"setpoint": [], "pose": []}
-    with _as_in_flight(), _session() as (session, _):
+    with as_in_flight(), _session() as (session, _):
         sender = Sender(Outbox(lambda: crtp_wire.UNLOCK, 1000.0), CLOCK, session.transmit)
         sender.start()
         sender.change(lambda box: box.unlock(CLOCK.now_ns()))
         for number in range(ROUNDS):
             report(f"round {number + 1} of {ROUNDS}, {4 * SENDS} packets")
-            ours["setpoint"] += _paced(_our_setpoint(sender))
-            cflib["setpoint"] += _paced(lambda: session.commander.send_setpoint(1.0, 2.0, 17.0, 38842))
-            ours["pose"] += _paced(_our_pose(sender))
-            cflib["pose"] += _paced(lambda: session.loc.send_extpose((1.0, 2.0, 3.0), ATTITUDE))
+            ours["setpoint"] += paced(_our_setpoint(sender), SENDS)
+            cflib["setpoint"] += paced(lambda: session.commander.send_setpoint(1.0, 2.0, 17.0, 38842), SENDS)
+            ours["pose"] += paced(_our_pose(sender), SENDS)
+            cflib["pose"] += paced(lambda: session.loc.send_extpose((1.0, 2.0, 3.0), ATTITUDE), SENDS)
         sender.end()
     table = [
-        _row(f"cost of a {what} in the loop, {name}", ours[what], cflib[what], share, peer)
+        row(f"cost of a {what} in the loop, {name}", ours[what], cflib[what], share, peer)
         for what, peer in (("setpoint", "cflib send_setpoint"), ("pose", "cflib send_extpose"))
-        for name, share in (("median", 50.0), ("99th percentile", 99.0))
+        for name, share in SHARES
     ]
     report(f"{REPORTS} reports from the driver to the event loop")
     late_us = asyncio.run(_hand_off())
-    return [
-        *table,
-        *(
-            _row(f"report, from the driver to the event loop, {name}", late_us, None, share, None)
-            for name, share in (("median", 50.0), ("99th percentile", 99.0))
-        ),
-    ]
+    what = "report, from the driver to the event loop"
+    table += [row(f"{what}, {name}", late_us, None, share, None) for name, share in SHARES]
+    return table + link_mavlink.rows(report)
 
 
 def _our_setpoint(sender: Sender) -> Callable[[], None]:
@@ -96,17 +88,6 @@ def _our_pose(sender: Sender) -> Callable[[], None]:
     return send
 
 
-def _paced(call: Callable[[], object]) -> list[float]:
-    """How long each call took, in us."""
-    taken = []
-    for _ in range(SENDS):
-        began = time.perf_counter_ns()
-        call()
-        taken.append((time.perf_counter_ns() - began) * 1e-3)
-        time.sleep(PERIOD_S)
-    return taken
-
-
 async def _hand_off() -> list[float]:
     """us from a packet in the driver's queue to the function that takes it in the event loop."""
     loop, late_us = asyncio.get_running_loop(), list[float]()
@@ -116,7 +97,7 @@ async def _hand_off() -> list[float]:
         late_us.append((time.perf_counter_ns() - sent_ns) * 1e-3)
         arrived.set()
 
-    with _as_in_flight(), _session() as (session, driver):
+    with as_in_flight(), _session() as (session, driver):
         sent_ns = 0
         session.packet_received.add_callback(lambda _packet: loop.call_soon_threadsafe(take, sent_ns))
         for _ in range(REPORTS):
@@ -154,28 +135,3 @@ def _session() -> Iterator[tuple[Session, Any]]:
 def _swallow(sink: socket.socket) -> None:
     while sink.recv(64):
         pass
-
-
-@contextlib.contextmanager
-def _as_in_flight() -> Iterator[None]:
-    before = sys.getswitchinterval()
-    sys.setswitchinterval(SWITCH_INTERVAL_S)
-    try:
-        yield
-    finally:
-        sys.setswitchinterval(before)
-
-
-def _row(
-    what: str, ours_us: list[float], peer_us: list[float] | None, share: float, name: str | None
-) -> dict[str, Any]:
-    ours = float(np.percentile(ours_us, share))
-    peer = None if peer_us is None else float(np.percentile(peer_us, share))
-    return {
-        "what": what,
-        "unit": "us",
-        "ours": ours,
-        "peer": peer,
-        "peer_name": name,
-        "ratio": None if peer is None else peer / ours,
-    }

@@ -50,6 +50,7 @@ class Autopilot(ABC):
         self._force = 0.0
         self._goal = Goal(None, None, 0.0, 0.0)
         self.mode = self.first_mode
+        self._ready = False
 
     @property
     @abstractmethod
@@ -65,10 +66,6 @@ class Autopilot(ABC):
     @abstractmethod
     def landing(self) -> bool:
         """Whether its mode brings it down."""
-
-    @abstractmethod
-    def announce(self) -> None:
-        """Say what is said after a boot."""
 
     @abstractmethod
     def request_mode(self, mode: int) -> Result:
@@ -136,6 +133,12 @@ class Autopilot(ABC):
         """Collective force that the rotors are asked for, as a share of the weight."""
         return self._force
 
+    def announce(self) -> None:  # noqa: B027 - PX4 says nothing
+        """Say what is said at once after a boot."""
+
+    def _become_ready(self) -> None:  # noqa: B027 - ArduPilot says nothing
+        """Say what is said once it could be armed."""
+
     def take_odometry(self, message: Any) -> None:
         """ODOMETRY."""
         self.feed(self._pose_of(message))
@@ -152,6 +155,9 @@ class Autopilot(ABC):
     def step(self, now_ns: int) -> None:
         """Live one period."""
         self.now_ns = now_ns
+        if not self._ready and self.age_s >= self.setup.boot_s:
+            self._ready = True
+            self._become_ready()
         self.estimator.predict(self.body.inertial, now_ns, self.landed)
         self._notice_ground()
         if self.armed:

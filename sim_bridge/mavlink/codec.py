@@ -14,6 +14,7 @@ from sim_bridge.mavlink.framing import SIGNED, split
 from sim_bridge.mavlink.signing import Signatures, signed
 
 LINK_ID = 0
+common.MAVLINK_IGNORE_CRC = 0  # pymavlink lets the environment switch checksums off: a vehicle does not
 
 
 @dataclass(frozen=True, slots=True)

@@ -238,6 +238,5 @@ class Px4(Autopilot):
         names = {number: name for name, number in self.modes.items()}
         return names.get(mode, "?").capitalize()
 
-    def announce(self) -> None:
-        """What it says of its boot."""
+    def _become_ready(self) -> None:
         self.say(INFO, "Ready for takeoff!")

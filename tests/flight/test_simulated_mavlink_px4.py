@@ -269,6 +269,14 @@ def test_offboard_is_armed_only_while_setpoints_come(client: Client) -> None:
     assert client.texts[-1] == "Preflight Fail: No offboard signal"
 
 
+def test_it_says_when_it_is_ready() -> None:
+    client = Client(boot_s=2.0)
+    client.wait(1900)
+    assert not client.texts
+    client.wait(200)
+    assert client.texts == ["Ready for takeoff!"]
+
+
 def test_other_arming_numbers_are_unsupported(client: Client) -> None:
     assert client.command(ARM, 2) == UNSUPPORTED
     assert client.command(ARM, math.nan) == UNSUPPORTED

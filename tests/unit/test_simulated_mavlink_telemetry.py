@@ -97,6 +97,7 @@ def test_estimator_status_says_whether_there_is_a_position() -> None:
 
 def test_severities_come_with_the_texts() -> None:
     client = Client()
+    client.wait(10)
     client.mode(6 << 16)
     client.wait(10)
     assert [(text.severity, text.text[:9]) for text in client.of("STATUSTEXT")] == [
@@ -114,6 +115,17 @@ def test_a_mavlink_1_packet_is_understood() -> None:
     client.vehicle.receive(packet, 0)
     client.wait(10)
     assert client.of("AUTOPILOT_VERSION")
+
+
+def test_a_packet_with_a_wrong_checksum_is_noise() -> None:
+    client = Client()
+    client.wait(100)
+    packet = bytearray(common.MAVLink_timesync_message(0, 7).pack(common.MAVLink(None, srcSystem=245)))
+    packet[-1] ^= 1
+    client.forget()
+    client.vehicle.receive(bytes(packet), client.now_ns)
+    client.wait(4)
+    assert not [message for message in client.of("TIMESYNC") if message.tc1]
 
 
 def test_flags_that_nobody_knows_make_a_packet_unknown() -> None:

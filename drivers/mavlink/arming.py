@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers.mavlink.autopilot import Autopilot
 from drivers.mavlink.commands import ACCEPTED, NO_ANSWER, Commands, result_name
+from drivers.mavlink.custody import Custody
 from drivers.mavlink.dialect import mavlink
 from drivers.mavlink.picture import Picture
 from drivers.mavlink.waiting import pause, until
@@ -82,26 +82,27 @@ async def arm(controls: Controls) -> None:
     raise RefusedError(f"the autopilot will not arm: {controls.reason(result)}")
 
 
-async def disarm(controls: Controls, may: Callable[[], bool], *, flown: bool) -> None:
+async def disarm(controls: Controls, custody: Custody) -> None:
     """Disarm on the ground: after a flight by its own LAND mode, else by order; by force where neither helps.
 
     ArduPilot does not reliably see a touchdown on no thrust, and then refuses an ordinary disarm for seconds.
 
-    may: asked before each order: whether it still stands on the ground, and nobody else flies it.
+    custody: asked before each order; somebody else's vehicle is left alone.
 
     Raises:
         RefusedError: it stays armed.
     """
     picture, clock = controls.picture, controls.clock
-    if flown and await _lands(controls):
+    if custody.flown and await _lands(controls):
         return
-    for forced in (0.0, FORCED):
-        if not may():
-            return
-        result = await controls.commands.ask(_ARM, 0.0, forced)
-        if await until(clock, lambda: picture.armed is False, CONFIRM_S):
-            return
-    raise RefusedError(f"the autopilot stays armed: {controls.reason(result)}")
+    result = NO_ANSWER
+    for may, forced in ((custody.is_ours, 0.0), (custody.may_be_cut, FORCED)):
+        if may():
+            result = await controls.commands.ask(_ARM, 0.0, forced)
+            if await until(clock, lambda: picture.armed is False, CONFIRM_S):
+                return
+    if custody.is_ours():
+        raise RefusedError(f"the autopilot stays armed: {controls.reason(result)}")
 
 
 async def land(controls: Controls) -> bool:

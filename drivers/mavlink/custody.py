@@ -23,13 +23,15 @@ class Custody:
         """Who flies in our place, and in which mode; empty while nobody does."""
         self.lost = False
         """Whether it was disarmed in the air, not by us."""
+        self.ours = False
+        """Whether it was armed by us, and has not been disarmed since."""
         self.flown = self.landing = False
         """Whether a setpoint has gone out since arming; whether it was told to land by itself."""
         self._contact, self._outbox, self._airborne = contact, outbox, airborne
 
     def begin(self) -> None:
         """It is going to be armed."""
-        self.lost = self.flown = self.landing = False
+        self.ours, self.lost, self.flown, self.landing = True, False, False, False
 
     def watch(self, message: Message, now_ns: int) -> None:
         """Look at each heartbeat."""
@@ -40,9 +42,13 @@ class Custody:
         elif not self._is_in_expected_mode():
             self._hand_over(now_ns)
 
+    def is_ours(self) -> bool:
+        """Whether we armed it, and nobody else has it since."""
+        return self.ours and not self._outbox.over
+
     def may_be_cut(self) -> bool:
-        """Whether its motors may be stopped by force: on the ground, and nobody else flies it."""
-        return not self._outbox.over and not self._airborne()
+        """Whether its motors may be stopped by force: ours, and on the ground."""
+        return self.is_ours() and not self._airborne()
 
     def require_armed_in(self, mode: int, now_ns: int) -> None:
         """Refuse to go on where the mode was changed, or it was disarmed, while the motors came up.
@@ -65,6 +71,7 @@ class Custody:
         return mode == autopilot.flight_mode or self._outbox.mode not in (Mode.READY, Mode.FLYING)
 
     def _note_disarmed(self, now_ns: int) -> None:
+        self.ours = self.ours and self._outbox.mode is Mode.IDLING and not self.landing
         if self._outbox.latched:
             self._outbox.confirm_off()
         elif self._outbox.mode is Mode.FLYING and self._airborne():

@@ -130,7 +130,7 @@ class MavlinkLink:
         try:
             if self._outbox.latched:
                 await until(self._clock, lambda: picture.armed is False, STOP_S)
-            elif picture.armed:
+            elif picture.armed and self._custody.ours:
                 await self._leave()
         finally:
             await self._close()
@@ -170,20 +170,20 @@ class MavlinkLink:
         self._outbox.ready(self._clock.now_ns())
 
     async def disarm(self) -> None:
-        """Make a vehicle on the ground disarm; one that flew, by its LAND mode. Nothing where somebody else has it.
+        """Make our vehicle on the ground disarm; one that flew, by its LAND mode. Somebody else's is left alone.
 
         Raises:
             RefusedError: not connected, or it stays armed.
         """
         if self._tending is None:
             raise RefusedError("the vehicle cannot be disarmed: the link is not open")
-        if self._outbox.over:
-            return
-        if self._contact.picture.armed:
-            flown = self._custody.landing = self._custody.flown
-            self._idle_thrust = 0.0
-            self._outbox.idle(self._clock.now_ns())
-            await arming.disarm(self._controls, self._custody.may_be_cut, flown=flown)
+        if self._contact.picture.armed and self._custody.is_ours():
+            self._custody.landing, self._idle_thrust = self._custody.flown, 0.0
+            if self._airborne():  # it may stand on something
+                self._outbox.land(self._clock.now_ns())
+            else:
+                self._outbox.idle(self._clock.now_ns())
+            await arming.disarm(self._controls, self._custody)
         self._outbox.rest(self._clock.now_ns())
 
     def send(self, setpoint: AttitudeThrust, stamp_ns: int) -> None:
@@ -255,6 +255,8 @@ class MavlinkLink:
             reason = "its motors were stopped; connect anew"
         elif self._outbox.over:
             reason = f"{self._custody.taken_over or 'it was disarmed in the air'}; connect anew"
+        elif self._contact.picture.armed:
+            reason = "it is armed already, not by us"
         elif self._contact.picture.restarts != self._restarts:
             reason = "the autopilot was restarted since it was set up; connect anew"
         else:

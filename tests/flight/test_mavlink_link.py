@@ -395,6 +395,25 @@ def test_a_pilot_who_takes_over_while_the_motors_come_up_has_it() -> None:
     run(main)
 
 
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_vehicle_that_somebody_else_has_armed_is_left_alone(flavour: str) -> None:
+    async def main() -> None:
+        async with bench(flavour, rc=True) as made:
+            async with made.link() as link:
+                made.vehicle.firmware.pilot.request_arm(True, True)
+                assert made.armed
+                await wait_s(0.3)
+                assert "it is armed already, not by us" in await arming_refusal(link)
+                await link.disarm()
+                sent = len(made.air.sent(COMMAND))
+            assert len(made.air.sent(COMMAND)) == sent
+            assert commands(made, 400) == []
+            assert commands(made, 176) == []
+            assert made.armed
+
+    run(main)
+
+
 def test_arming_that_takes_too_long_ends_disarmed() -> None:
     """Every acknowledgement but the first word of progress is lost, and the heartbeat keeps still."""
 

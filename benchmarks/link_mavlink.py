@@ -25,7 +25,7 @@ from lcd_flight.flight.realtime import prioritised
 ROUNDS = 5
 SENDS = 200
 """Of each side in each round."""
-BURSTS = 10
+BURSTS = 20
 """Likewise."""
 STREAM = 300
 """Setpoints at 100 Hz."""
@@ -71,9 +71,11 @@ async def _costs(report: Callable[[str], None], sky: Sky, sides: Sequence[Side])
     for number in range(ROUNDS):
         report(f"MAVLink round {number + 1} of {ROUNDS}, {len(sides) * (SENDS + BURSTS * BURST)} packets")
         turn = number % len(sides)
-        for side in (*sides[turn:], *sides[:turn]):
+        in_turn = (*sides[turn:], *sides[:turn])
+        for side in in_turn:
             costs["setpoint"][side.name] += _sent(side, sky)
-            costs["attitude"][side.name] += [await _burst(side, sky) for _ in range(BURSTS)]
+        for side in in_turn * BURSTS:
+            costs["attitude"][side.name].append(await _burst(side, sky))
     return costs
 
 

@@ -24,7 +24,7 @@ PHASE_LABELS = {
     Phase.BRAKE_HOLD: "BRAKE",
     Phase.LAND_NOW: "LAND NOW",
     Phase.DESCEND_BLIND: "DESCEND",
-    Phase.HANDED_OVER: "HANDED OVER",
+    Phase.HANDED_OVER: "HAND OVER",
     Phase.KILL: "CUT",
     Phase.CRASHED: "CRASHED",
 }

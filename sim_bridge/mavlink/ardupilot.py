@@ -34,8 +34,10 @@ SLOPE = 0.87
 """Of force over weight by thrust over hover thrust: x0.8 gives 0.824 g, x1.2 gives 1.172 g."""
 LATE_ORIGIN_M = 0.09
 """Bias of the height where poses came before the origin."""
-VISO_TIMEOUT_S, SETTLED_S, FLAGS_S, FAILSAFE_S = 0.3, 2.0, 7.0, 8.0
-"""Poses are healthy so long after one; what the filter needs at first; its flags stay good; it gives up."""
+VISO_TIMEOUT_S, STEADY_S = 0.3, 1.0
+"""Poses are healthy so long after one, once they have come for so long."""
+SETTLED_S, FLAGS_S, FAILSAFE_S = 2.0, 7.0, 8.0
+"""What the filter needs at first; its flags stay good so long without poses; it gives up."""
 GOOD, CONSTANT = 0x33F, 0x80
 """EKF_STATUS_REPORT flags with a position, and the one of a filter that has none."""
 WITHOUT_POSITION = 0x7
@@ -58,15 +60,21 @@ class ArduPilot(Autopilot):
     origin: tuple[int, int, int] | None = None
     """Latitude and longitude in 1e-7 deg, height in mm."""
     _internal_error = False
-    _followed = False
 
     @property
     def has_position(self) -> bool:
         """An origin, poses for a while, and the last one not too long ago."""
         estimator = self.estimator
         started = self.origin is not None and estimator.taken_ns is not None
-        settled = started and (self.now_ns - estimator.since_ns) / NS_PER_S >= SETTLED_S
-        return (settled or self._followed) and estimator.age_s(self.now_ns) < FLAGS_S
+        settled = (self.now_ns - estimator.since_ns) / NS_PER_S >= SETTLED_S
+        return started and settled and estimator.age_s(self.now_ns) < FLAGS_S
+
+    @property
+    def sees_steadily(self) -> bool:
+        """Whether poses have been coming for a second, none late."""
+        estimator = self.estimator
+        steady = (self.now_ns - estimator.steady_ns) / NS_PER_S >= STEADY_S
+        return steady and estimator.age_s(self.now_ns) <= VISO_TIMEOUT_S
 
     @property
     def flags(self) -> int:
@@ -109,8 +117,7 @@ class ArduPilot(Autopilot):
         """The first of the checks that fails."""
         if not self.parameters["ARMING_CHECK"]:
             return "internal errors" if self._internal_error else ""
-        sees = bool(self.parameters["VISO_TYPE"])
-        late = self.estimator.age_s(self.now_ns) > VISO_TIMEOUT_S
+        late = bool(self.parameters["VISO_TYPE"]) and not self.sees_steadily
         checks = (
             (self._internal_error, "Internal errors 0x1000000"),
             (self.age_s < 0.7 * self.setup.boot_s, "Accels inconsistent"),
@@ -119,7 +126,7 @@ class ArduPilot(Autopilot):
             (self.mode in _UNARMABLE, f"{self._name(self.mode)} mode not armable"),
             (self.mode in _BY_HAND and not self.setup.rc, "RC not found"),
             (self.mode in _PLACED and self.origin is None, "waiting for home"),
-            (self.mode in _PLACED and sees and late, "VisOdom not healthy"),
+            (self.mode in _PLACED and late, "VisOdom not healthy"),
             (self.mode in _PLACED and not self.has_position, "Need Position Estimate"),
         )
         return next((text for fails, text in checks if fails), "")
@@ -199,7 +206,6 @@ class ArduPilot(Autopilot):
         return 2.0 if self.landing else 6.0
 
     def _react(self) -> None:
-        self._followed = self.has_position
         if self.body.broken:
             self.disarm("Crash: Disarming: AngErr=90>30")
         elif self.landed and (self.landing or self._idles()):

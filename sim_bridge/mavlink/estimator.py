@@ -27,6 +27,8 @@ GATE_M, GATE_GROWTH = 0.5, 0.5
 """m, and m/s since the last pose that was taken: a position that is farther off is not."""
 FORGET_NS = 7_000_000_000
 """After so long of poses that were not taken it starts anew from one."""
+STEADY_NS = 300_000_000
+"""Poses farther apart are no steady stream (ArduPilot, AP_VisualOdom: 300 ms)."""
 LONGEST_STEP_S = 0.25
 _NS_PER_S = 1e9
 
@@ -56,8 +58,8 @@ class Estimator:
         """m, added to what is seen: where its origin is not the frame's."""
         self.taken_ns: int | None = None
         """When the last pose was taken; None: none was yet."""
-        self.since_ns = 0
-        """Since when poses have been coming, without a gap of 0.3 s."""
+        self.since_ns = self.steady_ns = 0
+        """Since when poses have been coming, without a gap of 7 s; and without one of 0.3 s."""
         self.ratio = 0.0
         """The last innovation over its gate."""
         self._seen_ns: int | None = None
@@ -81,8 +83,10 @@ class Estimator:
     def see(self, pose: SeenPose, now_ns: int, *, heading_too: bool = True, velocity_too: bool = True) -> None:
         """A pose from outside."""
         seen = _added(pose.position, self.offset, 1.0)
-        if self._seen_ns is None or now_ns - self._seen_ns > 0.3 * _NS_PER_S:
+        if self._seen_ns is None or now_ns - self._seen_ns > FORGET_NS:
             self.since_ns = now_ns
+        if self._seen_ns is None or now_ns - self._seen_ns > STEADY_NS:
+            self.steady_ns = now_ns
         dt_s = min(LONGEST_STEP_S, self.age_s(now_ns))
         self._seen_ns = now_ns
         error = _added(seen, self.position, -1.0)

@@ -235,6 +235,15 @@ def test_armed_and_idle_it_disarms_after_ten_seconds(client: Client) -> None:
     assert client.texts[-1] == "Disarmed by auto preflight disarming"
 
 
+def test_it_stays_armed_after_landing_where_it_is_told_to() -> None:
+    client = Client(wrong="COM_DISARM_LAND:0")
+    client.take_off()
+    client.mode(PX4_LAND)
+    client.wait(20_000)
+    assert client.pilot.landed
+    assert client.pilot.armed
+
+
 @pytest.mark.parametrize(
     ("options", "mode", "reason"),
     [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Mapping
 
 from drivers.mavlink import frames_wire
@@ -15,6 +16,8 @@ from lcd_flight.model.frames import normalized
 
 REBOOT_MS = 1_000
 """The vehicle's own clock goes back by more: it was restarted."""
+MAX_MESSAGES = 100
+"""Kept until they are asked for: a vehicle may talk without end."""
 _NOT_SENT = 0xFFFF
 _PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 _AIRBORNE = {
@@ -62,7 +65,7 @@ class Picture:
         self.has_origin = False
         self.texts = StatusTexts()
         self._frame: Frame = frame
-        self._messages: list[str] = []
+        self._messages: deque[str] = deque(maxlen=MAX_MESSAGES)
         self._takes: Mapping[str, Callable[[Message, int], None]] = {
             "HEARTBEAT": self._take_heartbeat,
             "SYS_STATUS": self._take_status,
@@ -94,7 +97,8 @@ class Picture:
             self.say(text)
         if self.stamp_ns is None:
             return None
-        messages, self._messages = tuple(self._messages), []
+        messages = tuple(self._messages)
+        self._messages.clear()
         return Telemetry(
             stamp_ns=self.stamp_ns,
             battery_V=self.battery_V,

@@ -189,7 +189,10 @@ def test_a_vehicle_that_hears_nothing_any_more_lands_by_its_own_failsafe() -> No
     assert "no offboard signal" in done.told
 
 
-@pytest.mark.parametrize(("share", "outcome"), [(0.01, Outcome.LANDED), (0.05, Outcome.LANDED), (0.3, Outcome.ABORTED)])
+@pytest.mark.parametrize(
+    ("share", "outcome"),
+    [(0.01, Outcome.LANDED), (0.05, Outcome.LANDED), (0.2, Outcome.ABORTED), (0.3, Outcome.ABORTED)],
+)
 def test_loss_both_ways(share: float, outcome: Outcome) -> None:
     luck = random.Random(4)  # noqa: S311 - chance, not secrecy
     losing = [False]

@@ -119,6 +119,15 @@ class TestPicture:
         assert telemetry is not None
         assert telemetry.messages == ("the autopilot was restarted",)
 
+    def test_a_vehicle_that_talks_without_end_does_not_fill_the_memory(self) -> None:
+        picture = Picture("enu")
+        for n in range(1_000):
+            picture.take(text(f"text {n}", 6), 0)
+        telemetry = picture.telemetry(now_ns=0, lost=False)
+        assert telemetry is not None
+        assert len(telemetry.messages) == 100
+        assert telemetry.messages[-1] == "info: text 999"
+
     def test_an_attitude_that_is_none_yet(self) -> None:
         picture = Picture("enu")
         picture.take(self.attitude(1, (math.nan,) * 4), 0)

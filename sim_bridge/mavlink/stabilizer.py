@@ -67,10 +67,9 @@ def wanted_rates(wanted: Hamilton, q: Hamilton, gains: Gains) -> Vector3:
     rest = product(inverse(tilt), wanted)
     about = HEADING_WEIGHT * math.remainder(2.0 * math.atan2(rest[3], rest[0]), math.tau)
     goal = product(tilt, (math.cos(0.5 * about), 0.0, 0.0, math.sin(0.5 * about)))
-    w, x, y, z = product(inverse(q), goal)
-    double = 2.0 if w >= 0.0 else -2.0
+    _, x, y, z = product(inverse(q), goal)  # its w is not negative: both turns are short ways
     each = (gains.tilt, gains.tilt, gains.heading / HEADING_WEIGHT)
-    p, r, s = (_within(double * g * e, most) for g, e, most in zip(each, (x, y, z), LARGEST_RATES, strict=True))
+    p, r, s = (_within(2.0 * g * e, most) for g, e, most in zip(each, (x, y, z), LARGEST_RATES, strict=True))
     return (p, r, s)
 
 

@@ -84,6 +84,8 @@ def test_the_tilt_is_turned_the_shortest_way_and_the_heading_with_less_weight() 
     assert (p, q, r) == pytest.approx((6.5 * 2 * math.sin(math.radians(5.0)), 0.0, 0.0), abs=1e-9)
     _, _, r = wanted_rates(turned(yaw_deg=10.0), UPRIGHT, GAINS)
     assert r == pytest.approx(2.8 * math.radians(10.0), rel=0.01)
+    _, _, r = wanted_rates(turned(yaw_deg=60.0), UPRIGHT, GAINS)
+    assert r == pytest.approx(2.0 * math.sin(math.radians(12.0)) * 2.8 / 0.4, rel=1e-6)
 
 
 def test_rates_are_bounded_and_upside_down_is_no_special_case() -> None:

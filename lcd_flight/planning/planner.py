@@ -27,6 +27,8 @@ from lcd_flight.planning.minimum_snap import snap
 Timing: TypeAlias = Literal["fixed", "retimed"]
 """`fixed`: the durations as given. `retimed`: moved between segments at equal total time."""
 
+_SEGMENTS_OF_STEP = 3
+"""What `PlannerOptions.step` is meant for."""
 _BLOCK_SEGMENTS = 192
 """Segments that are planned at a time: what a walk holds of them stays in a core's cache."""
 
@@ -71,9 +73,9 @@ class PlannerOptions:
     """mu; less than this, and long missions end in time allocations that the network is wrong about."""
     cost_weight: float = 1.0
     """What the tracking cost is multiplied by; a mission's `weight`."""
-    iterations: int = 30
-    step: float = 0.12
-    """Adam's first step; it decays to zero along a cosine."""
+    iterations: int = 32
+    step: float = 0.1
+    """Adam's first step for three segments; it decays to zero along a cosine."""
     start: Literal["analytic", "minimum-snap"] = "analytic"
     """Where the solve begins; `analytic` is the same solve on the analytic cost, with as many iterations."""
 
@@ -176,7 +178,7 @@ def _solved(whitening: Whitening, cost: TrackingCost, options: PlannerOptions) -
     """Solve, then judge every row."""
     objective = PlanObjective(whitening, cost, options)
     start = _start(whitening, cost, options, objective.size)
-    descent = descend(objective, start, options.iterations, options.step, safe_start=not start.any())
+    descent = descend(objective, start, options.iterations, objective.first_step, safe_start=not start.any())
     z, theta = objective.unpack(descent.best)
     found, minimum = whitening.plan(z, theta), whitening.minimum
     before, after = _Judgement.of(cost, minimum), _Judgement.of(cost, found)
@@ -215,7 +217,8 @@ def _start(whitening: Whitening, cost: TrackingCost, options: PlannerOptions, si
     if options.start == "minimum-snap" or isinstance(cost, ThrustProxy):
         return zeros
     analytic = replace(options, snap_weight=ANALYTIC_SNAP_WEIGHT, cost_weight=1.0)
-    return descend(PlanObjective(whitening, ThrustProxy(), analytic), zeros, options.iterations, options.step).best
+    objective = PlanObjective(whitening, ThrustProxy(), analytic)
+    return descend(objective, zeros, options.iterations, objective.first_step).best
 
 
 class PlanObjective:
@@ -226,6 +229,11 @@ class PlanObjective:
         self._predictor = cost if isinstance(cost, ErrorPredictor) else None
         self._z_size = math.prod(whitening.z_shape[1:])
         self.size = self._z_size + whitening.durations_s.shape[1]
+
+    @property
+    def first_step(self) -> float:
+        """Adam moves every variable by as much: less where there are more, since |z|^2 is a share of all the snap."""
+        return self._options.step * math.sqrt(_SEGMENTS_OF_STEP / self._whitening.durations_s.shape[1])
 
     def unpack(self, variables: FloatArray) -> tuple[FloatArray, FloatArray]:
         """z (N, S - 1, 3, 4) and theta (N, S)."""

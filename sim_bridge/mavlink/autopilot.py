@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from lcd_flight.model.frames import yaw_of
 from sim_bridge.mavlink.body import Body
 from sim_bridge.mavlink.estimator import Estimator, SeenPose
 from sim_bridge.mavlink.frames import Hamilton, heading, level, ned_attitude
@@ -248,11 +247,6 @@ class Autopilot(ABC):
             self._rest_ns = self.now_ns
         elif not self.landed and self.rested_s >= self._landed_after_s():
             self.landed = True
-
-    @property
-    def true_yaw_rad(self) -> float:
-        """Counter-clockwise from east, where it truly points."""
-        return yaw_of(self.body.state.q_WB)
 
     def _level(self) -> Hamilton:
         return level(self._goal.yaw)

@@ -15,12 +15,13 @@ from pymavlink.dialects.v20 import common
 from sim_bridge.mavlink.autopilot import Autopilot
 from sim_bridge.mavlink.estimator import SeenPose
 from sim_bridge.mavlink.frames import unit
-from sim_bridge.mavlink.guidance import Goal, Wish, towards
+from sim_bridge.mavlink.guidance import Wish, towards
 from sim_bridge.mavlink.odometry import LOCAL_FRD, LOCAL_NED, pose_of_odometry
 from sim_bridge.mavlink.stabilizer import Gains
 from sim_bridge.mavlink.vocabulary import CRITICAL, INFO, NS_PER_S, WARNING, AttitudeTarget, Result
 
-IGNORE_RATES, IGNORE_THRUST, IGNORE_ATTITUDE = 0b111, 64, 128
+IGNORE_THRUST, IGNORE_ATTITUDE = 64, 128
+"""Bits of SET_ATTITUDE_TARGET.type_mask; rates are not flown, ignored or not."""
 PROOF_S = 0.5
 """2 Hz: setpoints farther apart are no stream."""
 STREAM_S = 1.0
@@ -29,8 +30,8 @@ _ESTIMATORS = frozenset(
     {common.MAV_ESTIMATOR_TYPE_NAIVE, common.MAV_ESTIMATOR_TYPE_VISION, common.MAV_ESTIMATOR_TYPE_VIO}
 )
 """Of ODOMETRY: others, MOCAP among them, are logged by PX4 but not fused."""
-POSITION, HEIGHT, HEADING, VELOCITY = 1, 2, 8, 4
-"""Bits of EKF2_EV_CTRL; HEIGHT is bit 1, VELOCITY bit 2, HEADING bit 3."""
+PLACE, HEIGHT, VELOCITY, HEADING = 1, 2, 4, 8
+"""Bits of EKF2_EV_CTRL."""
 
 
 def custom_mode(main: int, sub: int = 0) -> int:
@@ -39,7 +40,7 @@ def custom_mode(main: int, sub: int = 0) -> int:
 
 
 MANUAL, ALTCTL, POSCTL, ACRO, OFFBOARD, STABILIZED = (custom_mode(main) for main in (1, 2, 3, 5, 6, 7))
-TAKEOFF, LOITER, MISSION, RTL, LAND = (custom_mode(4, sub) for sub in (2, 3, 4, 5, 6))
+TAKEOFF, LOITER, RTL, LAND = (custom_mode(4, sub) for sub in (2, 3, 5, 6))
 _BY_HAND = frozenset({MANUAL, ALTCTL, POSCTL, ACRO, STABILIZED})
 _PLACED = frozenset({POSCTL, TAKEOFF, LOITER, RTL})
 _AFTER_LOSS = {0: POSCTL, 1: ALTCTL, 2: STABILIZED, 3: RTL, 4: LAND, 5: LOITER}
@@ -138,7 +139,7 @@ class Px4(Autopilot):
 
     def _see(self, pose: SeenPose) -> None:
         uses = int(self.parameters["EKF2_EV_CTRL"])
-        if uses & POSITION and uses & HEIGHT:
+        if uses & PLACE and uses & HEIGHT:
             self.estimator.see(pose, self.now_ns, heading_too=bool(uses & HEADING), velocity_too=bool(uses & VELOCITY))
 
     def _wish(self) -> Wish:
@@ -154,8 +155,7 @@ class Px4(Autopilot):
 
     def _climb(self) -> Wish:
         start = self._goal.down or 0.0
-        goal: Goal = self._goal._replace(down=start - self.parameters["MIS_TAKEOFF_ALT"])
-        return towards(goal, self.estimator)
+        return towards(self._goal._replace(down=start - self.parameters["MIS_TAKEOFF_ALT"]), self.estimator)
 
     def _spool(self) -> float:
         return 1.0 if self.armed_s >= self.parameters["COM_SPOOLUP_TIME"] else 0.0

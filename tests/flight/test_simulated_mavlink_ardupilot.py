@@ -335,6 +335,15 @@ def test_disarming_in_the_air_is_refused_unless_forced(flying: Client) -> None:
     assert flying.command(ARM, 0, 21196) == ACCEPTED
 
 
+def test_armed_and_idle_it_disarms_after_ten_seconds(client: Client) -> None:
+    client.mode(GUIDED_NOGPS)
+    assert client.command(ARM, 1) == ACCEPTED
+    client.wait(9800)
+    assert client.pilot.armed
+    client.wait(400)
+    assert not client.pilot.armed
+
+
 def test_a_roll_of_45_degrees_is_flown(flying: Client) -> None:
     flying.fly(800, THRUST, turned(roll_deg=45.0))
     assert flying.pilot.estimator.attitude[1] == pytest.approx(math.sin(math.radians(22.5)), abs=0.03)

@@ -184,10 +184,10 @@ def test_whoever_speaks_after_the_vehicle_from_elsewhere_is_not_heard() -> None:
         async with bench() as made, made.link() as link:
             await link.arm()
             await stream(link, level(1.2), 0.5)
-            spoof = mavlink.MAVLink_heartbeat_message(2, 12, 129, 3 << 16, 4, 3).pack(mavlink.MAVLink(None, 1, 1))
-            for _ in range(20):
-                made.air.deliver(bytes(spoof), ("127.0.0.1", 9))
-                made.air.deliver(bytes(spoof), ("10.9.9.9", 14580))
+            spoof, spoofer = mavlink.MAVLink_heartbeat_message(2, 12, 129, 3 << 16, 4, 3), mavlink.MAVLink(None, 1, 1)
+            for spoofer.seq in range(256):
+                made.air.deliver(bytes(spoof.pack(spoofer)), ("127.0.0.1", 9))
+                made.air.deliver(bytes(spoof.pack(spoofer)), ("10.9.9.9", 14580))
             report = await stream(link, level(1.0), 0.2)
             assert report.taken_over == ""
             link.stop_motors()
@@ -410,6 +410,21 @@ def test_a_vehicle_that_somebody_else_has_armed_is_left_alone(flavour: str) -> N
             assert commands(made, 400) == []
             assert commands(made, 176) == []
             assert made.armed
+
+    run(main)
+
+
+def test_a_vehicle_that_somebody_else_flies_is_not_landed_when_the_link_closes() -> None:
+    async def main() -> None:
+        async with bench("px4", rc=True) as made:
+            async with made.link():
+                pilot = made.vehicle.firmware.pilot
+                pilot.request_arm(True, True)
+                pilot.request_mode(pilot.modes["takeoff"])
+                await wait_s(4.0)
+                assert made.height_m > 0.5
+            assert commands(made, 400) == []
+            assert commands(made, 176) == []
 
     run(main)
 

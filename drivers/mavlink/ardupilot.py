@@ -44,7 +44,9 @@ class ArduPilot:
     name: str = "ArduPilot"
     kind: int = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
     land_mode: int = _LAND
-    intervals_hz: Mapping[int, float] = field(default_factory=lambda: {mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: 5.0})
+    intervals_hz: Mapping[int, float] = field(
+        default_factory=lambda: {mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: 5.0, mavlink.MAVLINK_MSG_ID_RAW_IMU: 10.0}
+    )
     hover_parameter: str = "MOT_THST_HOVER"
     thrust_slope: float = 0.87
     motors_off_s: float = 2.1

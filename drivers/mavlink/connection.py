@@ -15,9 +15,10 @@ from lcd_flight.model import LinkContext, RawPose, RefusedError
 
 FIRST_POSE_S = 5.0
 ORIGIN_S = 1.0
-ORIGIN_ATTEMPTS = 5
+ORIGIN_ATTEMPTS = 20
+"""After a boot its estimator takes none yet."""
 CHECKS_S = 30.0
-"""For the autopilot's own checks: ArduPilot's sensors settle for 15 to 25 s after a boot."""
+"""ArduPilot's sensors settle for 15 to 25 s after a boot."""
 CHECKS_PERIOD_S = 1.0
 
 
@@ -35,7 +36,7 @@ class Connection:
         self._streams = False
 
     async def set_up(self) -> None:
-        """Parameters, origin, poses, estimate, its own checks, in this order.
+        """Parameters, origin, poses, estimate, settled sensors, in this order.
 
         Raises:
             RefusedError: something is not as flight needs it, with all that is wrong.
@@ -102,15 +103,14 @@ class Connection:
             await self._clock.sleep_until(now_ns + POLL_NS)
 
     async def _checks(self) -> None:
-        """Wait for the autopilot's own checks; arming asks again in any case."""
+        """Wait for sensors that settle after a boot; arming asks again in any case."""
         deadline_ns = self._clock.now_ns() + round(CHECKS_S * 1e9)
-        while not self._has_passed_checks() and self._clock.now_ns() < deadline_ns:
+        while not self._has_settled() and self._clock.now_ns() < deadline_ns:
             self.contact.commands.tell(mavlink.MAV_CMD_RUN_PREARM_CHECKS)
             await pause(self._clock, CHECKS_PERIOD_S)
 
-    def _has_passed_checks(self) -> bool:
-        """By its own word, or by the time since its boot where it says nothing."""
+    def _has_settled(self) -> bool:
+        """By its own checks, or the time since its boot: what they find later has other reasons, and arming tells."""
         picture = self.contact.picture
-        if picture.prearm_ok is not None:
-            return picture.prearm_ok
-        return picture.boot_ms is None or picture.boot_ms >= 1e3 * self.contact.autopilot.settles_s
+        settled = picture.boot_ms is None or picture.boot_ms >= 1e3 * self.contact.autopilot.settles_s
+        return settled or picture.prearm_ok is True

@@ -12,7 +12,7 @@ from drivers.mavlink.session import Session
 from drivers.mavlink.waiting import until
 from lcd_flight.model import Clock, RefusedError
 
-ANSWER_S = 0.6
+ANSWER_S = 1.0
 """For all that were asked for at once."""
 ATTEMPTS = 5
 """A parameter that does not exist gets no answer at all."""

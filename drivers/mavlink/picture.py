@@ -16,6 +16,8 @@ from lcd_flight.model.frames import normalized
 
 REBOOT_MS = 1_000
 """The vehicle's own clock goes back by more: it was restarted."""
+MILLI_G = 1e-3 * GRAVITY_M_PER_S2
+"""Of RAW_IMU as ArduPilot fills it in."""
 MAX_MESSAGES = 100
 """Kept until they are asked for: a vehicle may talk without end."""
 _NOT_SENT = 0xFFFF
@@ -74,7 +76,8 @@ class Picture:
             "LOCAL_POSITION_NED": self._take_position,
             "ESTIMATOR_STATUS": self._take_flags,
             "EKF_STATUS_REPORT": self._take_flags,
-            "HIGHRES_IMU": self._take_acceleration,
+            "HIGHRES_IMU": lambda message, _: self._take_force(message, 1.0),
+            "RAW_IMU": lambda message, _: self._take_force(message, MILLI_G),
             "AUTOPILOT_VERSION": self._take_version,
             "GPS_GLOBAL_ORIGIN": self._take_origin,
             "STATUSTEXT": self._take_text,
@@ -147,8 +150,9 @@ class Picture:
     def _take_flags(self, message: Message, _arrival_ns: int) -> None:
         self.estimator_flags = int(message.flags)
 
-    def _take_acceleration(self, message: Message, _arrival_ns: int) -> None:
-        force = (message.xacc, message.yacc, message.zacc)
+    def _take_force(self, message: Message, unit: float) -> None:
+        """unit: m/s^2."""
+        force = (message.xacc * unit, message.yacc * unit, message.zacc * unit)
         if all(abs(part) < 100.0 * GRAVITY_M_PER_S2 for part in force):
             self.specific_force_B = frames_wire.body(force)
 

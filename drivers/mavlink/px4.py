@@ -38,7 +38,9 @@ class Px4:
     kind: int = mavlink.MAV_AUTOPILOT_PX4
     flight_mode: int = _OFFBOARD
     land_mode: int = _LAND
-    intervals_hz: Mapping[int, float] = field(default_factory=lambda: {mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 5.0})
+    intervals_hz: Mapping[int, float] = field(
+        default_factory=lambda: {mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 5.0, mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: 10.0}
+    )
     hover_parameter: str = "MPC_THR_HOVER"
     thrust_slope: float = 1.0
     motors_off_s: float = 1.0

@@ -153,6 +153,11 @@ class TestPicture:
         picture.take(mavlink.MAVLink_highres_imu_message(0, 1.0, 2.0, -9.8, *(0.0,) * 10, 0), 0)
         assert picture.specific_force_B == (1.0, -2.0, 9.8)
 
+    def test_accelerometers_of_ardupilot(self) -> None:
+        picture = Picture("enu")
+        picture.take(mavlink.MAVLink_raw_imu_message(0, 0, 100, -1000, *(0,) * 6), 0)
+        assert picture.specific_force_B == pytest.approx((0.0, -0.981, 9.81))
+
     @pytest.mark.parametrize(
         ("state", "failsafe", "terminated"), [(4, False, False), (5, True, False), (8, True, True)]
     )

@@ -168,8 +168,8 @@ class Firmware:
 
     def _timesync(self, heard: Heard) -> None:
         if heard.message.tc1 == 0:
-            now_ns = self.pilot.now_ns - self.pilot.boot_ns
-            self._answer(common.MAVLink_timesync_message(now_ns, heard.message.ts1))
+            since_boot_ns = max(1, self.pilot.now_ns - self.pilot.boot_ns)  # 0 would be another question
+            self._answer(common.MAVLink_timesync_message(since_boot_ns, heard.message.ts1))
 
     def _set_origin(self, heard: Heard) -> None:
         m = heard.message

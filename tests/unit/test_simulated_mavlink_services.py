@@ -272,6 +272,12 @@ def test_it_asks_for_the_clients_clock(flavour: str) -> None:
     assert not client.of("TIMESYNC"), "an answer is not answered"
 
 
+def test_a_clock_that_just_began_is_no_question() -> None:
+    client = Client()
+    client.send(common.MAVLink_timesync_message(0, 77))
+    assert [(told.tc1, told.ts1) for told in client.of("TIMESYNC")] == [(1, 77)]
+
+
 @BOTH
 def test_system_time_is_the_date(flavour: str) -> None:
     client = Client(flavour)

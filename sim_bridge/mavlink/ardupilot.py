@@ -102,7 +102,9 @@ class ArduPilot(Autopilot):
         return True
 
     def request_mode(self, mode: int) -> Result:
-        """Any known mode while disarmed; one that needs a position only with one while armed."""
+        """Any known mode while disarmed; armed, one that needs a position only with one. The same changes nothing."""
+        if mode == self.mode:
+            return Result.ACCEPTED
         if mode not in self.modes.values():
             self.say(CRITICAL, f"No such mode {mode}")
             return Result.FAILED
@@ -136,7 +138,8 @@ class ArduPilot(Autopilot):
         if self.mode not in (GUIDED, GUIDED_NOGPS) or message.type_mask & ~RATES:
             return
         if message.type_mask not in (0, RATES):
-            self.request_mode(self.mode)
+            self.target = None
+            self._enter(self.mode)
             return
         size = sum(part * part for part in message.q)
         if not abs(size - 1.0) <= 1e-3:

@@ -140,8 +140,9 @@ class Bench:
         self._tell()
 
     def _is_on(self, at_s: float | None, now_ns: int) -> bool:
+        """Whether a fault that lasts has begun; one at 0 has from the start."""
         since_s = self.since_s(now_ns)
-        return at_s is not None and since_s is not None and since_s >= at_s
+        return at_s == 0.0 or (at_s is not None and since_s is not None and since_s >= at_s)
 
     def _tell(self) -> None:
         """Armed or not, and in which mode, where it is another than what was told last."""

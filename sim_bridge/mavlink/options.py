@@ -64,7 +64,7 @@ class MavlinkOptions(msgspec.Struct, frozen=True):
     freeze_ms: Milliseconds = 3000.0
     """For how long."""
     mute_heartbeat_s: Seconds | None = None
-    """When it stops sending heartbeats, and nothing else."""
+    """When it stops sending heartbeats, and nothing else; 0: it never sends one."""
     foreign_system: Annotated[int, msgspec.Meta(ge=0, le=255)] = 0
     """Number of another vehicle whose heartbeats come in between; 0: none."""
     lose_ack: Annotated[int, msgspec.Meta(ge=0, le=65535)] = 0
@@ -86,8 +86,8 @@ class MavlinkOptions(msgspec.Struct, frozen=True):
     pilot_act: str = "loiter"
     """What the pilot does: a mode's name, or `disarm`."""
     forge_s: Seconds | None = None
-    """When somebody sends packets in its name that are signed with another key."""
+    """When somebody sends packets in its name that are signed with another key; 0: from the start."""
     replay_s: Seconds | None = None
-    """When somebody sends again what it sent before."""
+    """When somebody sends again what it sent before; 0: from the start."""
     die_s: Seconds | None = None
     """When all power is lost."""

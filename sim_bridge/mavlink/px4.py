@@ -93,7 +93,9 @@ class Px4(Autopilot):
         return (self.now_ns - self._stream_ns) / NS_PER_S >= STREAM_S
 
     def request_mode(self, mode: int) -> Result:
-        """A mode that cannot be flown now is refused."""
+        """A mode that cannot be flown now is refused; the same changes nothing."""
+        if mode == self.mode:
+            return Result.ACCEPTED
         if mode not in self.modes.values():
             return self._refuse_mode("Unsupported main mode")
         if (mode == OFFBOARD and not self.streams) or (mode in _PLACED and self.armed and not self.has_position):

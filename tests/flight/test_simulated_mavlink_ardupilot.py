@@ -298,6 +298,13 @@ def test_unfit_setpoints_are_dropped_in_silence(flying: Client, q: tuple[float, 
     assert not flying.texts
 
 
+def test_asking_for_the_mode_that_it_has_changes_nothing(flying: Client) -> None:
+    """A client that lost the acknowledgement asks again in flight."""
+    target = flying.pilot.target
+    assert flying.mode(GUIDED_NOGPS) == ACCEPTED
+    assert flying.pilot.target is target
+
+
 def test_a_mask_that_ignores_some_rates_begins_guided_anew(flying: Client) -> None:
     flying.fly(200, THRUST, turned(roll_deg=20.0))
     flying.target(THRUST, turned(roll_deg=20.0), 3)

@@ -144,6 +144,13 @@ def test_heartbeats_stop_and_nothing_else() -> None:
     assert line.of("ATTITUDE")
 
 
+def test_there_is_no_heartbeat_at_all() -> None:
+    line = Line(mute_heartbeat_s=0.0)
+    line.wait(3000)
+    assert not line.of("HEARTBEAT")
+    assert line.of("ATTITUDE")
+
+
 def test_another_systems_heartbeats_come_in_between() -> None:
     line = Line(foreign_system=42)
     line.wait(3000)

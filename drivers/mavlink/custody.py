@@ -85,4 +85,4 @@ class Custody:
         mode = "unknown" if picture.custom_mode is None else autopilot.mode_name(picture.custom_mode)
         self.taken_over = f"{'the autopilot by itself' if alone else 'the pilot'} took over: mode {mode}"
         self._outbox.hand_over(now_ns)
-        picture.say(f"{self.taken_over}{self._contact.said()}")
+        picture.say(f"{self.taken_over}; its poses go on until it is disarmed{self._contact.said()}")

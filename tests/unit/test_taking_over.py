@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import msgspec
 import pytest
-from flight_bench import TAKEOFF_TICK, Flight, codes, first, fly, healthy, phases, setup, with_link
+import synthetic_flight
+from flight_bench import LIMITS, TAKEOFF_TICK, Flight, codes, first, fly, healthy, phases, plan, setup, with_link
 
 from lcd_flight.flight.replay import compare
 from lcd_flight.flight.result import Story
 from lcd_flight.model import MotorRequest, Outcome, Phase, State, TickInputs
 from lcd_flight.model.frames import IDENTITY
+from lcd_flight.record import LogWriter, read_log
+from lcd_flight.review.figures import figures_of
 from lcd_flight.wire import json_records
 
 WHO = "the pilot took over: mode POSCTL"
@@ -67,6 +72,17 @@ def test_a_landed_vehicle_has_landed_whoever_flies_it_then() -> None:
 
 def test_a_replay_hands_over_too() -> None:
     assert compare(fly(fault=taken_over), setup()).equal
+
+
+def test_the_log_of_it_tells_the_same(tmp_path: Path) -> None:
+    path = tmp_path / "flight.mcap"
+    writer = LogWriter(path, synthetic_flight.header(plan=plan(), limits=LIMITS))
+    for inputs, decided in fly(fault=taken_over):
+        writer.write(inputs, decided)
+    writer.close()
+    log = read_log(path)
+    assert figures_of(log).outcome is Outcome.ABORTED
+    assert [timed.finding.message for timed in log.findings if timed.finding.code == "taken_over"] == [WHO]
 
 
 def test_a_log_from_before_reads_as_nobody() -> None:

@@ -19,6 +19,7 @@ from drivers.mavlink.arming import Controls
 from drivers.mavlink.connection import Connection
 from drivers.mavlink.contact import Contact
 from drivers.mavlink.custody import Custody
+from drivers.mavlink.dialect import Message
 from drivers.mavlink.outbox import FALLBACK_NS, Outbox
 from drivers.mavlink.thrust import ThrustMap
 from drivers.mavlink.transport import Transport, transport_to
@@ -193,8 +194,8 @@ class MavlinkLink:
         if not setpoint.is_finite():
             self._invalid += 1
             return
-        thrust = self._map.share(setpoint.thrust_N)
-        if self._outbox.admits(stamp_ns, self._clock.now_ns()) and self._transmit(setpoint.q_WB, thrust):
+        message = self._message(setpoint.q_WB, self._map.share(setpoint.thrust_N))
+        if message is not None and self._outbox.admits(stamp_ns, self._clock.now_ns()) and self._transmit(message):
             self._sent += 1
             self._custody.flown = True
 
@@ -275,20 +276,21 @@ class MavlinkLink:
         slope = autopilot.thrust_slope if given.thrust_slope is None else given.thrust_slope
         return ThrustMap(hover, slope, self._context.vehicle.weight_N)
 
-    def _transmit(self, q_WB: Quaternion, thrust: float) -> bool:
-        """Validate, encode and send one setpoint, and note its bytes; whether it went."""
-        now_ns, session = self._clock.now_ns(), self._contact.session
+    def _message(self, q_WB: Quaternion, thrust: float) -> Message | None:
+        """A setpoint that has been validated; None, and counted, where it is unfit."""
+        now_ns, vehicle = self._clock.now_ns(), self._contact.session.vehicle
         try:
-            message = setpoint_wire.attitude_target(
-                q_WB, thrust, now_ns=now_ns, target=session.vehicle, frame=self._options.frame
-            )
+            return setpoint_wire.attitude_target(q_WB, thrust, now_ns=now_ns, target=vehicle, frame=self._options.frame)
         except ValueError:
             self._invalid += 1
-            return False
-        data = session.send(message)
+            return None
+
+    def _transmit(self, message: Message) -> bool:
+        """Encode and send one setpoint, and note its bytes; whether it went."""
+        data = self._contact.session.send(message)
         if data is None:
             return False
-        self._transmitted.append(Transmission(now_ns, data.hex()))
+        self._transmitted.append(Transmission(self._clock.now_ns(), data.hex()))
         return True
 
     async def _tend(self) -> None:
@@ -300,8 +302,8 @@ class MavlinkLink:
             await self._clock.sleep_until(now_ns + TEND_NS)
 
     def _due(self, now_ns: int) -> None:
-        if self._outbox.idles(now_ns):
-            self._transmit(self._level(), self._idle_thrust)
+        if self._outbox.idles(now_ns) and (message := self._message(self._level(), self._idle_thrust)) is not None:
+            self._transmit(message)
         if self._outbox.stops(now_ns):
             arming.cut(self._controls)
 

@@ -604,6 +604,11 @@ def test_unfit_setpoints_are_counted_and_not_sent() -> None:
             link.send(replace(level(1.0), q_WB=(0.0, 0.0, 0.0, 0.9)), CLOCK.now_ns())
             assert link.report(CLOCK.now_ns()).stale == 2
             assert len(made.air.sent(SETPOINT)) == count
+            await stream(link, level(0.3), 0.1)
+            for _ in range(15):  # unfit ones are no sign of life
+                link.send(replace(level(1.0), thrust_N=float("nan")), CLOCK.now_ns())
+                await wait_s(0.01)
+            assert link.report(CLOCK.now_ns()).fallback_active
             link.stop_motors()
 
     run(main)

@@ -38,23 +38,25 @@ class Controls:
         return f"{result_name(result)}; the autopilot says {said}" if said else result_name(result)
 
 
-async def enter_mode(controls: Controls, mode: int) -> None:
-    """Change the mode, and see it changed.
+async def enter_mode(controls: Controls, custody: Custody, mode: int) -> None:
+    """Change the mode, and see it changed. A change that was taken is not asked for again: a pilot may have undone it.
+
+    custody: asked before each attempt; a vehicle that is not ours any more is left in its mode.
 
     Raises:
         RefusedError: it will not, with its reason.
     """
     picture, clock, name = controls.picture, controls.clock, controls.autopilot.mode_name(mode)
     deadline_ns, result = clock.now_ns() + round(LIMIT_S * 1e9), ACCEPTED
-    while clock.now_ns() < deadline_ns:
+    while clock.now_ns() < deadline_ns and custody.is_ours():
         result = await controls.commands.ask(_SET_MODE, *controls.autopilot.mode_command(mode))
         if result == ACCEPTED and await until(clock, lambda: picture.custom_mode == mode, CONFIRM_S):
             return
         if picture.custom_mode == mode:  # the acknowledgement was lost, the change was not
             return
-        if result == NO_ANSWER:
+        if result in (ACCEPTED, NO_ANSWER):
             break
-        await pause(clock, RETRY_S if result != ACCEPTED else 0.0)
+        await pause(clock, RETRY_S)
     if result == ACCEPTED:
         now = "none" if picture.custom_mode is None else controls.autopilot.mode_name(picture.custom_mode)
         raise RefusedError(f"the autopilot took the change to {name} but stays in {now}: is a remote control on?")
@@ -74,9 +76,9 @@ async def arm(controls: Controls) -> None:
         result = await controls.commands.ask(_ARM, 1.0)
         if (result == ACCEPTED or picture.armed) and await until(clock, lambda: picture.armed is True, CONFIRM_S):
             return
-        if result == NO_ANSWER:
+        if result in (ACCEPTED, NO_ANSWER):
             break
-        await pause(clock, RETRY_S if result != ACCEPTED else 0.0)
+        await pause(clock, RETRY_S)
     if result == ACCEPTED:
         raise RefusedError("the autopilot took the order to arm but stays disarmed: look at its messages")
     raise RefusedError(f"the autopilot will not arm: {controls.reason(result)}")
@@ -93,7 +95,7 @@ async def disarm(controls: Controls, custody: Custody) -> None:
         RefusedError: it stays armed.
     """
     picture, clock = controls.picture, controls.clock
-    if custody.flown and await _lands(controls):
+    if custody.flown and await _lands(controls, custody):
         return
     result = NO_ANSWER
     for may, forced in ((custody.is_ours, 0.0), (custody.may_be_cut, FORCED)):
@@ -105,10 +107,10 @@ async def disarm(controls: Controls, custody: Custody) -> None:
         raise RefusedError(f"the autopilot stays armed: {controls.reason(result)}")
 
 
-async def land(controls: Controls) -> bool:
+async def land(controls: Controls, custody: Custody) -> bool:
     """Hand over to its LAND mode; whether it is seen in it."""
     try:
-        await enter_mode(controls, controls.autopilot.land_mode)
+        await enter_mode(controls, custody, controls.autopilot.land_mode)
     except RefusedError:
         return False
     return True
@@ -135,9 +137,9 @@ def _require_mode(controls: Controls) -> None:
         raise RefusedError(f"the mode was changed to {autopilot.mode_name(mode)} while arming: somebody else has it")
 
 
-async def _lands(controls: Controls) -> bool:
+async def _lands(controls: Controls, custody: Custody) -> bool:
     if controls.picture.armed is False:
         return True
-    if not await land(controls):
+    if not await land(controls, custody):
         return False
     return await until(controls.clock, lambda: controls.picture.armed is False, LAND_LIMIT_S)

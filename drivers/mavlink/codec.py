@@ -7,6 +7,7 @@ later good one fail. Here a damaged packet costs its first byte, and a failed ch
 
 from __future__ import annotations
 
+import hashlib
 from collections import Counter
 
 from drivers.mavlink.dialect import Message, mavlink
@@ -21,6 +22,10 @@ _NOT_ACCEPTED = "Invalid signature"
 """What pymavlink says of a packet that is whole, and unsigned or wrongly signed."""
 MAX_STREAMS = 64
 """Senders whose signing timestamps are remembered."""
+
+
+TOO_OLD = "too old"
+"""Signed with our key, but over a minute behind our time: a replay, or somebody whose clock must be told."""
 
 
 class _Checked(mavlink.MAVLink):  # type: ignore[misc]  # pymavlink is untyped
@@ -41,7 +46,8 @@ class _Checked(mavlink.MAVLink):  # type: ignore[misc]  # pymavlink is untyped
         if super().check_signature(msgbuf, srcSystem, srcComponent):
             return True
         stamp = int.from_bytes(msgbuf[-12:-6], "little")
-        self.refusal = "replayed" if before is not None and stamp <= before else "forged or too old"
+        genuine = hashlib.sha256(self.signing.secret_key + msgbuf[:-6]).digest()[:6] == msgbuf[-6:]
+        self.refusal = "forged" if not genuine else "replayed" if before is not None and stamp <= before else TOO_OLD
         if before is None:
             stamps.pop(stream, None)
         else:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 from drivers.mavlink.autopilot import INTERVALS_HZ, flavour, kind_name
 from drivers.mavlink.codec import Codec
 from drivers.mavlink.commands import Commands
@@ -19,6 +21,9 @@ REPORTS_S = 1.0
 """For the first reports after they were asked for; they are asked for `REPORTS_ATTEMPTS` times."""
 REPORTS_ATTEMPTS = 5
 VERSION_S = 0.5
+KEEP_NS = 15_000_000_000
+RESERVE = 45 * 100_000
+"""Signing timestamps are noted so often, so far ahead (45 s, in tens of microseconds): a crash comes unannounced."""
 SILENT_REPORTS_NS = 1_000_000_000
 """Heartbeats without reports for so long: the autopilot was restarted and must be asked again."""
 
@@ -45,7 +50,7 @@ class Contact:
         self.commands = Commands(self.session, clock, ours)
         self.parameters = Parameters(self.session, self.autopilot, clock)
         self.session.listen(self.picture.take)
-        self._asked_ns = 0
+        self._asked_ns = self._kept_ns = 0
 
     async def find(self) -> None:
         """Open the transport, wait for the vehicle's heartbeat, have it report.
@@ -54,7 +59,8 @@ class Contact:
             RefusedError: the transport is not to be had, nobody or somebody else is there, or it does not report.
         """
         await self.session.open()
-        self._keep_stamps()
+        self._kept_ns = self.clock.now_ns()
+        self._keep(self.session.newest_stamp + RESERVE)
         if not await until(self.clock, lambda: self.picture.heartbeats > 0, self.options.connect_s):
             raise RefusedError(self._unheard())
         if self.picture.kind != self.autopilot.kind:
@@ -67,11 +73,15 @@ class Contact:
     def close(self) -> None:
         """Close the transport; may be called at any time."""
         self.session.close()
-        self._keep_stamps()
+        self._keep(self.session.newest_stamp)
 
     def tend(self, now_ns: int) -> None:
         """What is due from time to time: our heartbeat, and reports from an autopilot that was restarted."""
         self.session.beat(now_ns)
+        if self._stamps is not None and now_ns - self._kept_ns >= KEEP_NS:
+            self._kept_ns = now_ns
+            newest = self.session.newest_stamp + RESERVE
+            threading.Thread(target=self._keep, args=(newest,), daemon=True).start()  # a disk may be slow
         picture = self.picture
         heard = picture.heartbeat_ns is not None and now_ns - picture.heartbeat_ns < 2 * SILENT_REPORTS_NS
         silent = picture.q_ns is None or now_ns - picture.q_ns > SILENT_REPORTS_NS
@@ -100,11 +110,11 @@ class Contact:
     def _reports(self) -> bool:
         return self.picture.q_ns is not None and self.picture.heard_status
 
-    def _keep_stamps(self) -> None:
-        """Note the newest signing timestamp for the next start."""
+    def _keep(self, newest: int) -> None:
+        """Note for the next start that signing timestamps up to `newest` are or will be used. May wait for the disk."""
         if self._stamps is not None:
             try:
-                self._stamps.keep(self.session.newest_stamp)
+                self._stamps.keep(newest)
             except OSError as error:
                 self.picture.say(f"the signing timestamp could not be kept: {error}")
 

@@ -37,7 +37,10 @@ class Custody:
         """Look at each heartbeat."""
         if message.get_msgId() != mavlink.MAVLINK_MSG_ID_HEARTBEAT:
             return
-        if self._contact.picture.armed is False:
+        armed = bool(self._contact.picture.armed)
+        if self._outbox.latched:
+            self._outbox.confirm(armed=armed)
+        elif not armed:
             self._note_disarmed(now_ns)
         elif not self._is_in_expected_mode():
             self._hand_over(now_ns)
@@ -72,17 +75,19 @@ class Custody:
 
     def _note_disarmed(self, now_ns: int) -> None:
         self.ours = self.ours and self._outbox.mode is Mode.IDLING and not self.landing
-        if self._outbox.latched:
-            self._outbox.confirm_off()
-        elif self._outbox.mode is Mode.FLYING and self._airborne():
-            self.lost = True
-            self._outbox.hand_over(now_ns)
-            self._contact.picture.say(f"the vehicle was disarmed in the air, not by us{self._contact.said()}")
+        if self._outbox.mode not in (Mode.READY, Mode.FLYING):
+            return
+        if not self._airborne():  # it has landed, or somebody has disarmed it: who arms it again has it
+            self._outbox.rest(now_ns)
+            return
+        self.lost = True
+        self._outbox.hand_over(now_ns, to_pilot=True)
+        self._contact.picture.say(f"the vehicle was disarmed in the air, not by us{self._contact.said()}")
 
     def _hand_over(self, now_ns: int) -> None:
         picture, autopilot = self._contact.picture, self._contact.autopilot
         alone = picture.failsafe or self._outbox.falls_back(now_ns)
         mode = "unknown" if picture.custom_mode is None else autopilot.mode_name(picture.custom_mode)
         self.taken_over = f"{'the autopilot by itself' if alone else 'the pilot'} took over: mode {mode}"
-        self._outbox.hand_over(now_ns)
+        self._outbox.hand_over(now_ns, to_pilot=not alone)
         picture.say(f"{self.taken_over}; its poses go on until it is disarmed{self._contact.said()}")

@@ -95,6 +95,7 @@ class MavlinkLink:
         self._custody = Custody(contact, self._outbox, self._airborne)
         self._map: ThrustMap | None = None
         self._tending: asyncio.Task[None] | None = None
+        self._arming: asyncio.Future[None] | None = None
         self._idle_thrust = 0.0
         """Of the setpoints between arming and the control loop's first."""
         self._fell_back = False
@@ -154,12 +155,13 @@ class MavlinkLink:
         self._custody.begin()
         self._idle_thrust = 0.0
         self._outbox.idle(self._clock.now_ns())
+        self._arming = asyncio.ensure_future(self._brought_up(mode))
         try:
             async with asyncio.timeout(ARMING_S):
-                await pause(self._clock, STREAM_S)
-                await arming.enter_mode(self._controls, mode)
-                await arming.arm(self._controls)
-                await self._bring_motors_up()
+                await asyncio.wait({self._arming})
+            if self._arming.cancelled():
+                raise RefusedError("the vehicle was not armed: it was stopped or disarmed meanwhile")
+            self._arming.result()
             self._custody.require_armed_in(mode, self._clock.now_ns())
         except BaseException as error:
             if self._contact.picture.armed and self._custody.may_be_cut():
@@ -168,6 +170,8 @@ class MavlinkLink:
             if isinstance(error, TimeoutError):
                 raise RefusedError(f"arming took longer than {ARMING_S:g} s{self._contact.said()}") from None
             raise
+        finally:
+            await self._end_arming()
         self._outbox.ready(self._clock.now_ns())
 
     async def disarm(self) -> None:
@@ -178,6 +182,7 @@ class MavlinkLink:
         """
         if self._tending is None:
             raise RefusedError("the vehicle cannot be disarmed: the link is not open")
+        await self._end_arming()
         if self._contact.picture.armed and self._custody.is_ours():
             self._custody.landing, self._idle_thrust = self._custody.flown, 0.0
             if self._airborne():  # it may stand on something
@@ -195,18 +200,22 @@ class MavlinkLink:
             self._invalid += 1
             return
         message = self._message(setpoint.q_WB, self._map.share(setpoint.thrust_N))
-        if message is not None and self._outbox.admits(stamp_ns, self._clock.now_ns()) and self._transmit(message):
+        now_ns = self._clock.now_ns()
+        if message is not None and self._outbox.admits(stamp_ns, now_ns) and self._transmit(message):
+            self._outbox.sent(stamp_ns, now_ns)
             self._sent += 1
             self._custody.flown = True
 
     def stop_motors(self) -> None:
         """Emergency stop, latched: a forced disarm, repeated until the vehicle says that it is disarmed.
 
-        Not of a vehicle that somebody else flies.
+        Not of a vehicle that a pilot flies.
         """
         if self._tending is None or self._outbox.latched:
             return
         self._outbox.stop(self._clock.now_ns())
+        if self._arming is not None:
+            self._arming.cancel()
         self._due(self._clock.now_ns())
 
     def report(self, now_ns: int) -> LinkReport:
@@ -239,6 +248,20 @@ class MavlinkLink:
             return None
         silent_ns = now_ns - heartbeat_ns
         return silent_ns if silent_ns > HEARTBEAT_LOST_NS else max(now_ns - newest_ns, 0)
+
+    async def _brought_up(self, mode: int) -> None:
+        """From a stream of setpoints to motors that take thrust."""
+        await pause(self._clock, STREAM_S)
+        await arming.enter_mode(self._controls, self._custody, mode)
+        await arming.arm(self._controls)
+        await self._bring_motors_up()
+
+    async def _end_arming(self) -> None:
+        """No order to arm goes out after this."""
+        task, self._arming = self._arming, None
+        if task is not None and task is not asyncio.current_task():
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
 
     async def _bring_motors_up(self) -> None:
         """Wait until the motors take thrust; where they come up with the first one only, give a little of it."""
@@ -327,7 +350,7 @@ class MavlinkLink:
         if not self._outbox.over:
             self._custody.landing = True
             self._outbox.land(self._clock.now_ns())
-            await arming.land(self._controls)
+            await arming.land(self._controls, self._custody)
         await until(self._clock, lambda: picture.armed is False, POSES_S)
 
     async def _close(self) -> None:

@@ -51,7 +51,7 @@ class Outbox:
         self._newest_stamp_ns = 0
         self._fresh_ns = self._since_ns = 0
         self._next_ns = 0
-        self._off = False
+        self._off = self._pilot = False
 
     @property
     def latched(self) -> bool:
@@ -64,14 +64,17 @@ class Outbox:
         return self.mode in (Mode.STOPPED, Mode.HANDED_OVER)
 
     def admits(self, stamp_ns: int, now_ns: int) -> bool:
-        """Whether a setpoint of the tick that began at `stamp_ns` may go out now; it then counts as sent."""
+        """Whether a setpoint of the tick that began at `stamp_ns` may go out now; `sent` tells that it did."""
         if self.mode not in (Mode.READY, Mode.FLYING):
             return False
         if now_ns - stamp_ns > MAX_AGE_NS or stamp_ns < self._newest_stamp_ns:
             self.stale += 1
             return False
-        self.mode, self._newest_stamp_ns, self._fresh_ns = Mode.FLYING, stamp_ns, now_ns
         return True
+
+    def sent(self, stamp_ns: int, now_ns: int) -> None:
+        """It went out: what did not is silence."""
+        self.mode, self._newest_stamp_ns, self._fresh_ns = Mode.FLYING, stamp_ns, now_ns
 
     def falls_back(self, now_ns: int) -> bool:
         """Whether there has been silence for want of a fresh setpoint."""
@@ -93,9 +96,9 @@ class Outbox:
         self._next_ns = now_ns + STOP_PERIOD_NS
         return True
 
-    def confirm_off(self) -> None:
-        """The vehicle says that it is disarmed."""
-        self._off = True
+    def confirm(self, *, armed: bool) -> None:
+        """What the vehicle says after an emergency stop: one that is armed is stopped again."""
+        self._off = not armed
 
     def idle(self, now_ns: int) -> None:
         """Stream setpoints of our own from now on."""
@@ -113,12 +116,15 @@ class Outbox:
         """Nothing more, until it is armed again."""
         self._enter(Mode.SILENT, now_ns)
 
-    def hand_over(self, now_ns: int) -> None:
-        """Somebody else flies."""
+    def hand_over(self, now_ns: int, *, to_pilot: bool) -> None:
+        """Somebody else flies, or the autopilot by itself."""
         self._enter(Mode.HANDED_OVER, now_ns)
+        self._pilot = to_pilot
 
     def stop(self, now_ns: int) -> None:
-        """Emergency stop, for good. Not of a vehicle that somebody else flies."""
+        """Emergency stop, for good. Not of a vehicle that a pilot flies."""
+        if self.mode is Mode.HANDED_OVER and not self._pilot:
+            self.mode, self._since_ns, self._next_ns = Mode.STOPPED, now_ns, now_ns
         self._enter(Mode.STOPPED, now_ns)
 
     def _enter(self, mode: Mode, now_ns: int) -> None:

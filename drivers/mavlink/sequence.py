@@ -13,6 +13,8 @@ WINDOW = 64
 """So many numbers back, a packet may still come late; further back is a restart."""
 RESTART_AFTER = 3
 """Old numbers that follow each other: not late packets but a sender that counts from the beginning."""
+LATE_NS = 100_000_000
+"""After so long without a packet nothing comes late any more: what looks old is far ahead."""
 SILENCE_NS = 1_000_000_000
 """After so long a gap is not loss but absence, which is judged by its age."""
 _SECOND_NS = 1_000_000_000
@@ -40,13 +42,13 @@ class LossCounter:
 
     def take(self, number: int, now_ns: int) -> bool:
         """Note one packet; False where it is a second copy."""
-        last, silent = self._last, now_ns - self._last_ns > SILENCE_NS
+        last, late_ns = self._last, now_ns - self._last_ns
         self._last_ns = now_ns
-        if last is None or silent:
+        if last is None or late_ns > SILENCE_NS:
             self._begin(number)
             return self._count(now_ns, 0)
         ahead = (number - last) % NUMBERS
-        if 0 < ahead < NUMBERS - WINDOW:
+        if 0 < ahead < NUMBERS - WINDOW or (ahead and late_ns > LATE_NS):
             self._last, self._seen = number, (self._seen << ahead | 1) & _MASK
             self._old = 0
             return self._count(now_ns, ahead - 1)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 
-from drivers.mavlink.codec import Codec
+from drivers.mavlink.codec import TOO_OLD, Codec
 from drivers.mavlink.dialect import Message, mavlink
 from drivers.mavlink.sequence import LossCounter
 from drivers.mavlink.transport import Peer, Transport
@@ -48,7 +48,7 @@ class Session:
         self._peer: Peer | None = None
         self._buffer = bytearray()
         self._listeners: list[Listener] = []
-        self._heartbeat_ns = -HEARTBEAT_NS
+        self._heartbeat_ns = self._told_ns = -HEARTBEAT_NS
 
     async def open(self) -> None:
         """Begin to listen.
@@ -90,16 +90,7 @@ class Session:
         """Our heartbeat, once a second."""
         if now_ns - self._heartbeat_ns >= HEARTBEAT_NS:
             self._heartbeat_ns = now_ns
-            self.send(
-                mavlink.MAVLink_heartbeat_message(
-                    mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
-                    mavlink.MAV_AUTOPILOT_INVALID,
-                    0,
-                    0,
-                    mavlink.MAV_STATE_ACTIVE,
-                    3,
-                )
-            )
+            self.send(_heartbeat())
 
     def _receive(self, data: bytes, peer: Peer) -> None:
         if not self._admits(peer):
@@ -107,10 +98,13 @@ class Session:
             return
         now_ns = self._clock.now_ns()
         self._buffer += data
+        too_old = self.rejected[TOO_OLD]
         for message in self._codec.decode(self._buffer):
             self._take(message, peer, now_ns)
         if not self._transport.stream:  # a datagram holds whole packets
             self._buffer.clear()
+        if self._peer is None and self.rejected[TOO_OLD] > too_old:
+            self._tell_time(peer, now_ns)
 
     def _admits(self, peer: Peer) -> bool:
         if self._peer is None:
@@ -142,6 +136,19 @@ class Session:
         if message.tc1 == 0:
             self.send(mavlink.MAVLink_timesync_message(now_ns, message.ts1))
 
+    def _tell_time(self, peer: Peer, now_ns: int) -> None:
+        """Our signed heartbeat to one that has the key and an old clock, as boards without a battery have."""
+        if now_ns - self._told_ns >= HEARTBEAT_NS:
+            self._told_ns = now_ns
+            self._transport.send(self._codec.encode(_heartbeat(), now_ns), peer)
+
     def _strange(self, who: str) -> None:
         if who in self.strangers or len(self.strangers) < MAX_STRANGERS:
             self.strangers[who] += 1
+
+
+def _heartbeat() -> Message:
+    """An onboard computer that is at work."""
+    return mavlink.MAVLink_heartbeat_message(
+        mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
+    )

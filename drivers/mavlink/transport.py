@@ -19,7 +19,11 @@ Receiver: TypeAlias = Callable[[bytes, Peer], None]
 DATAGRAM = 2048
 DRAIN = 256
 """Datagrams taken at once: a flood must not keep the event loop from its ticks."""
-BACKLOG = 2048
+SEND_BUFFER = 4096
+"""Of a TCP connection: what waits in the system gets old there."""
+EMPTY_READS = 50
+"""So many reads in a row that find nothing, although there should be something: the port is gone."""
+BACKLOG = 1024
 """Bytes of a stream that may wait to be sent; more is left out, since old setpoints are worth nothing."""
 
 
@@ -126,16 +130,19 @@ class Udp:
             except OSError:  # the other side has refused an earlier packet
                 self.faults += 1
                 continue
-            self._receive(data, (address[0], address[1]))
+            if self._to is None or address[0] == self._to[0]:  # who was called is heard alone
+                self._receive(data, (address[0], address[1]))
 
 
 class _Stream:
     """Bytes through one file descriptor that does not block."""
 
     stream = True
+    empty_reads = 1
+    """So many reads that find nothing are the end."""
 
     def __init__(self, name: str) -> None:
-        self.faults = 0
+        self.faults = self._empty = 0
         self.name = name
         self._file: int | None = None
         self._receive: Receiver | None = None
@@ -170,12 +177,13 @@ class _Stream:
         except BlockingIOError:
             return
         except OSError:
-            data = b""
-        if not data:  # the other side has closed
+            data, self._empty = b"", self.empty_reads
+        self._empty = 0 if data else self._empty + 1
+        if self._empty >= self.empty_reads:  # the other side has closed
             self.faults += 1
             self._end()
-            return
-        self._receive(data, (self.name, 0))
+        elif data:
+            self._receive(data, (self.name, 0))
 
     def _flush(self) -> None:
         if self._file is None:
@@ -216,6 +224,7 @@ class Tcp(_Stream):
         try:
             await asyncio.wait_for(asyncio.get_running_loop().sock_connect(made, address), self._limit_s)
             made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            made.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
         except BaseException as error:
             made.close()
             if isinstance(error, OSError | TimeoutError):
@@ -234,6 +243,8 @@ class Tcp(_Stream):
 
 class SerialPort(_Stream):
     """A serial port, for us alone."""
+
+    empty_reads = EMPTY_READS
 
     def __init__(self, path: str, baud: int) -> None:
         super().__init__(path)

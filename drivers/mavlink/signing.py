@@ -10,6 +10,7 @@ import contextlib
 import hashlib
 import os
 import re
+import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -93,7 +94,7 @@ class Timestamps:
             OSError: it cannot be written.
         """
         self._path.parent.mkdir(parents=True, exist_ok=True)
-        fresh = self._path.with_suffix(f".{os.getpid()}")
+        fresh = self._path.with_suffix(f".{os.getpid()}.{threading.get_ident()}")
         fresh.write_text(f"{newest}\n", encoding="ascii")
         fresh.replace(self._path)
 

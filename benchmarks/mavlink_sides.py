@@ -140,6 +140,7 @@ class Ours:
         data = self._session.send(target)
         if data is not None:
             self._log.append(Transmission(now_ns, data.hex()))
+            self._outbox.sent(now_ns, now_ns)
 
     async def taken_in(self, number: int) -> int:
         """By the event loop."""

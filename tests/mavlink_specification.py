@@ -20,6 +20,7 @@ DEFINITIONS = {
     "LOCAL_POSITION_NED": "u32 time_boot_ms, float x, float y, float z, float vx, float vy, float vz",
     "COMMAND_LONG": "u8 target_system, u8 target_component, u16 command, u8 confirmation, float param1, float param2, "
     "float param3, float param4, float param5, float param6, float param7",
+    "COMMAND_ACK": "u16 command, u8 result; u8 progress, i32 result_param2, u8 target_system, u8 target_component",
     "SET_ATTITUDE_TARGET": "u32 time_boot_ms, u8 target_system, u8 target_component, u8 type_mask, float[4] q, "
     "float body_roll_rate, float body_pitch_rate, float body_yaw_rate, float thrust; float[3] thrust_body",
     "TIMESYNC": "i64 tc1, i64 ts1; u8 target_system, u8 target_component",
@@ -34,6 +35,7 @@ NUMBERS_AND_EXTRAS = {
     "ATTITUDE_QUATERNION": (31, 246),
     "LOCAL_POSITION_NED": (32, 185),
     "COMMAND_LONG": (76, 152),
+    "COMMAND_ACK": (77, 143),
     "SET_ATTITUDE_TARGET": (82, 49),
     "TIMESYNC": (111, 34),
     "ODOMETRY": (331, 91),
@@ -45,6 +47,7 @@ TYPES = {
     "char": ("char", "s"),
     "u16": ("uint16_t", "H"),
     "u32": ("uint32_t", "I"),
+    "i32": ("int32_t", "i"),
     "i64": ("int64_t", "q"),
     "u64": ("uint64_t", "Q"),
     "float": ("float", "f"),

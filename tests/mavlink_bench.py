@@ -13,7 +13,7 @@ from short_mission import Listener
 
 from drivers.mavlink import options
 from drivers.mavlink.link import MavlinkLink
-from drivers.mavlink.transport import Peer, Receiver
+from drivers.mavlink.peer import Peer, Receiver
 from lcd_flight import plugins
 from lcd_flight.flight import virtual_time
 from lcd_flight.flight.loop import FlightLoop
@@ -69,6 +69,7 @@ class Air:
     vehicle: SimulatedMavlink
     stream: bool = False
     faults: int = 0
+    called: str | None = None
     tampers: Tampers = as_it_is
     ups: list[tuple[int, bytes]] = field(default_factory=list)
     """Every datagram that was sent to the vehicle, and when."""
@@ -85,6 +86,9 @@ class Air:
         for arriving in self.tampers(data, True, now_ns):
             self.vehicle.receive(arriving, now_ns)
         return True
+
+    def send_now(self, data: bytes, peer: Peer | None, /) -> bool:
+        return self.send(data, peer)
 
     def close(self) -> None:
         self.receive = None

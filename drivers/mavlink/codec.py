@@ -22,8 +22,8 @@ _NOT_ACCEPTED = "Invalid signature"
 """What pymavlink says of a packet that is whole, and unsigned or wrongly signed."""
 MAX_STREAMS = 64
 """Senders whose signing timestamps are remembered."""
-
-
+MINUTE = 60 * 100_000
+"""So far, in tens of microseconds, a sender may be behind our time."""
 TOO_OLD = "too old"
 """Signed with our key, but over a minute behind our time: a replay, or somebody whose clock must be told."""
 
@@ -47,7 +47,8 @@ class _Checked(mavlink.MAVLink):  # type: ignore[misc]  # pymavlink is untyped
             return True
         stamp = int.from_bytes(msgbuf[-12:-6], "little")
         genuine = hashlib.sha256(self.signing.secret_key + msgbuf[:-6]).digest()[:6] == msgbuf[-6:]
-        self.refusal = "forged" if not genuine else "replayed" if before is not None and stamp <= before else TOO_OLD
+        old = stamp + MINUTE < self.signing.timestamp
+        self.refusal = "forged" if not genuine else TOO_OLD if old else "replayed"
         if before is None:
             stamps.pop(stream, None)
         else:

@@ -11,8 +11,9 @@ from collections.abc import Callable
 
 from drivers.mavlink.codec import TOO_OLD, Codec
 from drivers.mavlink.dialect import Message, mavlink
+from drivers.mavlink.peer import Peer
 from drivers.mavlink.sequence import LossCounter
-from drivers.mavlink.transport import Peer, Transport
+from drivers.mavlink.transport import Transport
 from lcd_flight.model import Clock
 
 HEARTBEAT_NS = 1_000_000_000
@@ -82,9 +83,11 @@ class Session:
         self._listeners.append(listener)
 
     def send(self, message: Message) -> bytes | None:
-        """Send one message at once; its bytes, or None where it did not go out."""
+        """Send one message; its bytes, or None where it did not go out. A setpoint never waits behind older bytes."""
         data = self._codec.encode(message, self._clock.now_ns())
-        return data if self._transport.send(data, self._peer) else None
+        perishes = message.get_msgId() == mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET
+        hand_over = self._transport.send_now if perishes else self._transport.send
+        return data if hand_over(data, self._peer) else None
 
     def beat(self, now_ns: int) -> None:
         """Our heartbeat, once a second."""
@@ -103,10 +106,12 @@ class Session:
             self._take(message, peer, now_ns)
         if not self._transport.stream:  # a datagram holds whole packets
             self._buffer.clear()
-        if self._peer is None and self.rejected[TOO_OLD] > too_old:
+        if peer != self._peer and self.rejected[TOO_OLD] > too_old:
             self._tell_time(peer, now_ns)
 
     def _admits(self, peer: Peer) -> bool:
+        if self._transport.called not in (None, peer[0]):
+            return False
         if self._peer is None:
             return not self._hosts or peer[0] in self._hosts
         return peer == self._peer or (peer[0] == self._peer[0] and self._is_silent())

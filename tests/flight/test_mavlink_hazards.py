@@ -18,7 +18,7 @@ from drivers.mavlink.codec import Codec
 from drivers.mavlink.link import MavlinkLink
 from drivers.mavlink.sequence import LossCounter
 from drivers.mavlink.setpoint_wire import attitude_target
-from drivers.mavlink.transport import SerialPort, Tcp
+from drivers.mavlink.streams import SerialPort, Tcp
 from lcd_flight import plugins
 from lcd_flight.flight.clock import RealClock
 from lcd_flight.model import AttitudeThrust, Link, LinkContext, RefusedError
@@ -307,7 +307,7 @@ def test_setpoints_that_are_old_wait_nowhere_on_a_tcp_connection() -> None:
                 for _ in range(1000):
                     now_ns = clock.now_ns()
                     level_one = attitude_target((0.0, 0.0, 0.0, 1.0), 0.5, now_ns=now_ns, target=(1, 1), frame="enu")
-                    link.send(codec.encode(level_one, now_ns), None)
+                    link.send_now(codec.encode(level_one, now_ns), None)  # as a session sends setpoints
                     await asyncio.sleep(0.001)
                 for _ in range(100):
                     await asyncio.sleep(0.01)

@@ -17,11 +17,11 @@ from drivers.mavlink.codec import Codec
 from drivers.mavlink.commands import Commands
 from drivers.mavlink.dialect import Message, mavlink
 from drivers.mavlink.odometry_wire import Odometry
+from drivers.mavlink.peer import Peer, Receiver
 from drivers.mavlink.picture import Picture
 from drivers.mavlink.px4 import Px4
 from drivers.mavlink.session import Session
 from drivers.mavlink.signing import Key
-from drivers.mavlink.transport import Peer, Receiver
 from lcd_flight.model.frames import from_yaw, multiply, yaw_of
 
 TILT = math.radians(10.0)
@@ -35,6 +35,7 @@ class Wire:
 
     stream = False
     faults = 0
+    called = None
 
     def __init__(self) -> None:
         self.sent: list[str] = []
@@ -45,6 +46,9 @@ class Wire:
     def send(self, data: bytes, _peer: Peer | None, /) -> bool:
         self.sent.append(data.hex())
         return True
+
+    def send_now(self, data: bytes, peer: Peer | None, /) -> bool:
+        return self.send(data, peer)
 
     def close(self) -> None:
         """Nothing is held."""

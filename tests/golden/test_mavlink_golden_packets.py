@@ -23,12 +23,12 @@ from drivers.mavlink.commands import Commands
 from drivers.mavlink.frames_wire import attitude_from
 from drivers.mavlink.odometry_wire import Odometry, message
 from drivers.mavlink.options import Frame
+from drivers.mavlink.peer import Peer, Receiver
 from drivers.mavlink.picture import Picture
 from drivers.mavlink.px4 import Px4
 from drivers.mavlink.session import Session
 from drivers.mavlink.setpoint_wire import attitude_target
 from drivers.mavlink.signing import Key, Timestamps
-from drivers.mavlink.transport import Peer, Receiver
 
 KEY = hashlib.sha256(b"golden").digest()
 OURS, VEHICLE = (245, 191), (1, 1)
@@ -50,6 +50,7 @@ class Wire:
 
     stream: bool = False
     faults: int = 0
+    called: str | None = None
     sent: list[bytes] = field(default_factory=list)
     receive: Receiver | None = None
 
@@ -59,6 +60,9 @@ class Wire:
     def send(self, data: bytes, _peer: Peer | None, /) -> bool:
         self.sent.append(data)
         return True
+
+    def send_now(self, data: bytes, peer: Peer | None, /) -> bool:
+        return self.send(data, peer)
 
     def close(self) -> None:
         self.receive = None

@@ -1,7 +1,8 @@
 """Packets lost on the way here, by the gaps in a sender's sequence numbers. Pure.
 
 A late packet is not lost after all, a second copy counts once, and a sender that was restarted or not heard for a while
-begins anew: its numbers then say nothing about the ones before.
+begins anew: its numbers then say nothing about the ones before. A number that looks old is far ahead where there was
+time to send all those between. Numbers go around after 256: what a longer outage lost counts less 256.
 """
 
 from __future__ import annotations
@@ -13,8 +14,8 @@ WINDOW = 64
 """So many numbers back, a packet may still come late; further back is a restart."""
 RESTART_AFTER = 3
 """Old numbers that follow each other: not late packets but a sender that counts from the beginning."""
-LATE_NS = 100_000_000
-"""After so long without a packet nothing comes late any more: what looks old is far ahead."""
+AVERAGED = 64
+"""Packets over which the sender's period is averaged."""
 SILENCE_NS = 1_000_000_000
 """After so long a gap is not loss but absence, which is judged by its age."""
 _SECOND_NS = 1_000_000_000
@@ -33,6 +34,8 @@ class LossCounter:
         self.restarts = 0
         self._last: int | None = None
         self._last_ns = 0
+        self._period_ns = float(SILENCE_NS)
+        """Between packets of this sender, on average."""
         self._seen = 0
         """One bit for each of the last numbers, the newest lowest."""
         self._old = 0
@@ -48,10 +51,8 @@ class LossCounter:
             self._begin(number)
             return self._count(now_ns, 0)
         ahead = (number - last) % NUMBERS
-        if 0 < ahead < NUMBERS - WINDOW or (ahead and late_ns > LATE_NS):
-            self._last, self._seen = number, (self._seen << ahead | 1) & _MASK
-            self._old = 0
-            return self._count(now_ns, ahead - 1)
+        if 0 < ahead < NUMBERS - WINDOW or self._had_time_for(ahead or NUMBERS, late_ns):
+            return self._take_new(number, ahead or NUMBERS, now_ns, late_ns)
         return self._take_old(number, (last - number) % NUMBERS, now_ns)
 
     def share(self, now_ns: int) -> float:
@@ -60,6 +61,16 @@ class LossCounter:
             self._last_second.popleft()
         missing = max(sum(count for _, count in self._last_second), 0)
         return missing / max(1, missing + len(self._last_second))
+
+    def _had_time_for(self, packets: int, late_ns: int) -> bool:
+        """Whether the sender may have sent so many since the newest that came, at up to twice its average rate."""
+        return 2 * late_ns >= packets * self._period_ns
+
+    def _take_new(self, number: int, ahead: int, now_ns: int, late_ns: int) -> bool:
+        """A number further on than any before."""
+        self._last, self._seen, self._old = number, (self._seen << ahead | 1) & _MASK, 0
+        self._period_ns += (late_ns / ahead - self._period_ns) / min(self.received, AVERAGED)
+        return self._count(now_ns, ahead - 1)
 
     def _take_old(self, number: int, back: int, now_ns: int) -> bool:
         """A number that has been, or should have been, before."""

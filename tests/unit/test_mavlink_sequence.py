@@ -48,6 +48,39 @@ def test_after_a_second_of_silence_it_begins_anew() -> None:
     assert counter.lost == 0
 
 
+@pytest.mark.parametrize("rate_hz", [280, 400, 1000])
+@pytest.mark.parametrize("missing", [100, 191, 192, 208, 254, 255])
+def test_an_outage_is_loss_and_what_follows_it_is_heard(missing: int, rate_hz: int) -> None:
+    """Also where so many are lost that the next number looks like one that has been."""
+    counter, period_ns = LossCounter(), 1_000 * MS // rate_hz
+    for number in range(300):
+        counter.take(number % 256, number * period_ns)
+    heard = [counter.take(number % 256, number * period_ns) for number in range(300 + missing, 400 + missing)]
+    assert all(heard)
+    assert figures(counter) == (400, missing, 0, 0, 0)
+
+
+@pytest.mark.parametrize(("period_ms", "pause_ms"), [(200, 300), (100, 900), (20, 400), (5, 150)])
+def test_a_pause_in_which_too_few_could_be_sent_makes_nothing_old_new(period_ms: int, pause_ms: int) -> None:
+    """A slow sender, or one that was held up: a late packet is late and a copy a copy, however long it took."""
+    counter = LossCounter()
+    for index, number in enumerate([*range(98), 99]):
+        counter.take(number, index * period_ms * MS)
+    now_ns = (98 * period_ms + pause_ms) * MS
+    assert counter.take(98, now_ns)
+    assert not counter.take(99, now_ns)
+    assert figures(counter) == (100, 0, 1, 1, 0)
+
+
+def test_packets_that_were_held_up_and_come_all_at_once_are_no_loss() -> None:
+    counter = LossCounter()
+    for number in range(100):
+        counter.take(number, number * 5 * MS)
+    for number in range(100, 250):
+        assert counter.take(number, 1_245 * MS)
+    assert counter.lost == 0
+
+
 def test_second_copies_are_told() -> None:
     counter = LossCounter()
     assert counter.take(1, 0)

@@ -67,6 +67,8 @@ class Codec:
         self._signing, self._stamps = self._mav.signing, stamps
         self._signing.secret_key = None if key is None else key.secret
         self._signing.sign_outgoing = key is not None
+        if stamps is not None:  # what is heard before we have sent anything may be a replay too
+            self._signing.timestamp = stamps.first
 
     def newest_stamp(self, now_ns: int) -> int:
         """The signing timestamp below which no packet may be from now on; 0 without signing."""

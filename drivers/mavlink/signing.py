@@ -20,6 +20,8 @@ from lcd_flight.model import InputError, RefusedError
 _EPOCH_S = 1_420_070_400
 """2015-01-01, from which signing counts, in tens of microseconds."""
 _TICKS_PER_S = 100_000
+_STAMP_BITS = 48
+"""Of a timestamp in a packet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,29 +80,42 @@ class Timestamps:
     def __init__(self, key: Key, folder: Path | None = None) -> None:
         """folder: where they are kept; None: the user's state folder."""
         self._path = (folder or state_folder()) / f"mavlink-signing-{key.fingerprint}"
-        self._first = max(_real_time(), self._kept())
+        self.first = max(_real_time(), self._kept() + 1)
+        """The time at the start."""
         self._first_ns: int | None = None
+        self._noted: int | None = None
+        """What we kept last."""
+        self._keeping = threading.Lock()
 
     def at(self, now_ns: int) -> int:
         """At a moment of the monotonic clock."""
         if self._first_ns is None:
             self._first_ns = now_ns
-        return self._first + (now_ns - self._first_ns) // 10_000
+        return self.first + (now_ns - self._first_ns) // 10_000
 
     def keep(self, newest: int) -> None:
-        """Note for the next start that everything up to `newest` has been used. Writes a small file.
+        """Note for the next start that everything up to `newest` has been used. Writes a small file; from any thread.
+
+        What another program with this key has noted, or one before us, is never lowered; what we have noted ahead is.
 
         Raises:
             OSError: it cannot be written.
         """
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        fresh = self._path.with_suffix(f".{os.getpid()}.{threading.get_ident()}")
-        fresh.write_text(f"{newest}\n", encoding="ascii")
-        fresh.replace(self._path)
+        with self._keeping:
+            kept = self._kept()
+            if kept > newest and kept != self._noted:
+                return
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            fresh = self._path.with_name(f".{self._path.name}.{os.getpid()}")
+            fresh.write_text(f"{newest}\n", encoding="ascii")
+            fresh.replace(self._path)
+            self._noted = newest
 
     def _kept(self) -> int:
+        """What the file says; 0 where there is none, or it is damaged."""
         with contextlib.suppress(OSError, ValueError):
-            return int(self._path.read_text(encoding="ascii")) + 1
+            kept = int(self._path.read_text(encoding="ascii"))
+            return kept if 0 <= kept < 1 << _STAMP_BITS else 0
         return 0
 
 

@@ -185,6 +185,8 @@ def test_clock_and_origin() -> None:
 
 def test_signature() -> None:
     class Fixed:
+        first = 0
+
         def at(self, _now_ns: int) -> int:
             return 0x0123456789AB
 

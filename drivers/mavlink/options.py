@@ -35,7 +35,7 @@ class MavlinkOptions(msgspec.Struct, frozen=True):
     our_component: Id = 191
     """An onboard computer."""
     role: Literal["listen", "call"] = "listen"
-    """UDP only. `listen`: the address is ours and the vehicle speaks first; `call`: it is the vehicle's, heard alone."""
+    """UDP only. `listen`: the address is ours, the vehicle speaks first; `call`: it is the vehicle's, heard alone."""
     allow: str = ""
     """IP addresses that may be the vehicle, separated by commas; empty: whoever sends its heartbeat first."""
     frame: Frame = "enu"

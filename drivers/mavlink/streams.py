@@ -22,6 +22,9 @@ from lcd_flight.model import RefusedError
 
 HOLD_S = 0.05
 """Older bytes that the system still holds mean a stall. TCP's delayed acknowledgements take up to 40 ms."""
+QUIET_S = 0.1
+"""A vehicle at the other end of TCP that says nothing for so long may not read either: it has 64 kB and more to let
+setpoints get old in, and its system acknowledges them all the same."""
 SEND_BUFFER = 16_384
 """Of a TCP connection, with the system's own overhead of about 1 kB for each packet."""
 BITS_PER_BYTE = 10
@@ -44,6 +47,7 @@ class _Stream:
         self._file: int | None = None
         self._receive: Receiver | None = None
         self._backlog = Backlog()
+        self._heard_s = 0.0
 
     @property
     def faults(self) -> int:
@@ -86,7 +90,7 @@ class _Stream:
         return not waits and self._backlog.age_s(self._held(file), _now_s()) <= HOLD_S
 
     def _begin(self, file: int, receive: Receiver) -> None:
-        self._file, self._receive = file, receive
+        self._file, self._receive, self._heard_s = file, receive, _now_s()
         asyncio.get_running_loop().add_reader(file, self._drain)
 
     def _end(self) -> None:
@@ -111,6 +115,7 @@ class _Stream:
         except OSError:
             data = b""
         if data:
+            self._heard_s = _now_s()
             self._receive(data, (self.name, 0))
         else:  # the other side has closed
             self._fail()
@@ -179,6 +184,9 @@ class Tcp(_Stream):
 
     def _takes(self, file: int) -> bool:
         return _asked(file, _UNSENT) == 0
+
+    def _moves(self, file: int) -> bool:
+        return _now_s() - self._heard_s <= QUIET_S and super()._moves(file)
 
 
 class SerialPort(_Stream):

@@ -18,7 +18,7 @@ from drivers.mavlink.codec import Codec
 from drivers.mavlink.dialect import Message, mavlink
 from drivers.mavlink.session import Session
 from drivers.mavlink.setpoint_wire import attitude_target
-from drivers.mavlink.streams import HOLD_S, SerialPort, Tcp
+from drivers.mavlink.streams import HOLD_S, QUIET_S, SerialPort, Tcp
 from lcd_flight.flight.clock import RealClock
 
 CLOCK = RealClock()
@@ -119,6 +119,8 @@ class TestTcp:
                 assert transport.faults - before >= 100  # each setpoint that was left out is counted
                 resumed_ms = CLOCK.now_ns() // 1_000_000
                 data = await read_all(vehicle)
+                vehicle.send(b"alive")
+                await asyncio.sleep(0.02)
                 assert session.send(setpoint()) is not None
                 data += await read_all(vehicle)
                 messages = Codec(1, 1).decode(bytearray(data))
@@ -144,17 +146,36 @@ class TestTcp:
         assert b"old!" not in data
         assert data.endswith(b"new!" * 10)
 
-    def test_an_idle_listener_that_answers_nothing_gets_all(self) -> None:
-        """Acknowledgements that are delayed by up to 40 ms are no stall."""
+    def test_who_acknowledges_late_gets_all(self) -> None:
+        """Acknowledgements that are delayed by up to 40 ms, and reports at 20 Hz, are no stall."""
 
         async def main() -> int:
             async with tcp() as (transport, vehicle):
-                for _ in range(60):
+                for tick in range(60):
+                    if tick % 5 == 0:
+                        vehicle.send(b"report")
                     transport.send_now(bytes(SIZE), None)
                     await asyncio.sleep(0.01)
                 return len(await read_all(vehicle)) // SIZE
 
-        assert asyncio.run(main()) >= 57  # a machine under load may stall by itself
+        assert asyncio.run(main()) >= 50  # a machine under load may stall by itself
+
+    def test_who_stands_still_with_room_for_all_gets_a_tenth_of_a_second(self) -> None:
+        """Its system takes and acknowledges what its autopilot does not read: that it says nothing is all we see."""
+
+        async def main() -> tuple[int, bool]:
+            async with tcp() as (transport, vehicle):
+                for _ in range(100):
+                    transport.send_now(bytes(SIZE), None)
+                    await asyncio.sleep(0.01)
+                got = len(await read_all(vehicle)) // SIZE
+                vehicle.send(b"here again")
+                await asyncio.sleep(0.02)
+                return got, transport.send_now(bytes(SIZE), None)
+
+        got, again = asyncio.run(main())
+        assert 0 < got <= 100 * QUIET_S + 1
+        assert again
 
     def test_a_closed_connection_takes_nothing(self) -> None:
         async def main() -> None:

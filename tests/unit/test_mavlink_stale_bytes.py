@@ -133,6 +133,20 @@ class TestTcp:
         commands = [m for m in messages if m.get_type() == "COMMAND_LONG"]
         assert len(commands) * 40 <= BACKLOG
 
+    def test_behind_what_is_unsent_the_system_is_given_nothing(self) -> None:
+        """From the first packet on that did not fit into the other side's window, however short ago that was."""
+
+        async def main() -> list[int]:
+            async with tcp(receive_buffer=1024) as (transport, _vehicle):
+                await fill(transport)
+                assert transport.send(bytes(SIZE), None)
+                assert transport._file is not None
+                return [streams._asked(transport._file, streams._UNSENT), len(transport._backlog)]
+
+        unsent, waits = asyncio.run(main())
+        assert 0 < unsent <= SIZE
+        assert waits == SIZE
+
     def test_commands_of_a_long_stall_are_left_out_too(self) -> None:
         async def main() -> bytes:
             async with tcp(receive_buffer=1024) as (transport, vehicle):

@@ -215,7 +215,7 @@ class ArduPilot(Autopilot):
             self.disarm("Disarming motors")
         elif self._is_lost() and self.parameters["FS_EKF_ACTION"]:
             self.say(CRITICAL, "EKF Failsafe: changed to LAND Mode")
-            self._enter(LAND)
+            self._fail_over(LAND)
 
     def _idles(self) -> bool:
         return self.force <= 0.0 and 0.0 < self.parameters["DISARM_DELAY"] < self.idle_s

@@ -40,6 +40,8 @@ class Autopilot(ABC):
         """Whether it takes itself to stand."""
         self.flew = False
         """Whether it has left the ground since it was armed."""
+        self.failsafe = False
+        """Whether it flies by itself since something failed, until somebody changes the mode."""
         self.target: AttitudeTarget | None = None
         """The last one."""
         self.said: list[tuple[int, str]] = []
@@ -184,7 +186,7 @@ class Autopilot(ABC):
 
     def disarm(self, text: str = "") -> None:
         """Stop the motors."""
-        self.armed = False
+        self.armed = self.failsafe = False
         self._rest()
         if text:
             self.say(INFO, text)
@@ -204,12 +206,17 @@ class Autopilot(ABC):
 
     def _enter(self, mode: int) -> None:
         """From now on in this mode, from where it is."""
-        self.mode = mode
+        self.mode, self.failsafe = mode, False
         if self.armed and self.landing:
             self.landed, self._rest_ns = False, self.now_ns
         estimate = self.estimator
         x, y, z = estimate.position
         self._goal = Goal((x, y) if self.has_position else None, z, 0.0, heading(estimate.attitude))
+
+    def _fail_over(self, mode: int) -> None:
+        """Change the mode by itself."""
+        self._enter(mode)
+        self.failsafe = True
 
     def _hold(self, *, place: bool = True) -> Wish:
         """Stay where the mode was entered; or level, at that height."""

@@ -191,7 +191,7 @@ class Px4(Autopilot):
         if self.mode == OFFBOARD and (self.now_ns - self._proof_ns) / NS_PER_S > self.parameters["COM_OF_LOSS_T"]:
             self.say(CRITICAL, "Failsafe activated: no offboard signal")
             self._failing_ns = self.now_ns
-            self._enter(LOITER if self.has_position else ALTCTL)
+            self._fail_over(LOITER if self.has_position else ALTCTL)
         if self._failing_ns is None:
             return
         if (self.now_ns - self._failing_ns) / NS_PER_S >= self.parameters["COM_FAIL_ACT_T"]:
@@ -203,13 +203,13 @@ class Px4(Autopilot):
         if mode is None:
             self.disarm("Failsafe: termination")
         else:
-            self._enter(mode)
+            self._fail_over(mode)
 
     def _lose_position(self) -> None:
         """A mode that needs a position ends without one: it comes down level."""
         if self.mode in _PLACED and not self.landed and not self.has_position:
             self.say(CRITICAL, "Failsafe activated: position estimate invalid")
-            self._enter(LAND)
+            self._fail_over(LAND)
 
     def _mind_battery(self) -> None:
         if not self._warned and self.battery_share < self.parameters["BAT_LOW_THR"]:
@@ -218,7 +218,7 @@ class Px4(Autopilot):
         critical = self.battery_share < self.parameters["BAT_CRIT_THR"]
         if critical and self.parameters["COM_LOW_BAT_ACT"] >= 2 and not self.landing and not self.landed:
             self.say(CRITICAL, "Failsafe activated: critical battery")
-            self._enter(LAND)
+            self._fail_over(LAND)
 
     def _refuse_mode(self, text: str) -> Result:
         self.say(CRITICAL, text)

@@ -39,7 +39,7 @@ def heartbeat(pilot: Autopilot) -> Any:
     """HEARTBEAT."""
     maker = common.MAV_AUTOPILOT_PX4 if is_px4(pilot) else common.MAV_AUTOPILOT_ARDUPILOTMEGA
     base = CUSTOM | STABILIZES | GUIDED | (ARMED if pilot.armed else 0)
-    if pilot.body.broken:
+    if pilot.body.broken or pilot.failsafe:
         status = common.MAV_STATE_CRITICAL
     elif pilot.age_s < pilot.setup.boot_s:
         status = common.MAV_STATE_BOOT if is_px4(pilot) else common.MAV_STATE_STANDBY

@@ -134,6 +134,14 @@ def test_what_a_lost_stream_leads_to(action: int, mode: int) -> None:
     assert client.pilot.mode == mode
 
 
+def test_the_heartbeat_is_critical_while_a_failsafe_has_it_and_not_when_somebody_else_does(flying: Client) -> None:
+    flying.wait(2000)
+    assert flying.of("HEARTBEAT")[-1].system_status == common.MAV_STATE_CRITICAL
+    flying.pilot.request_mode(PX4_POSCTL)
+    flying.wait(1000)
+    assert flying.of("HEARTBEAT")[-1].system_status == common.MAV_STATE_ACTIVE
+
+
 def test_termination_stops_the_motors() -> None:
     client = Client(wrong="COM_OBL_RC_ACT:6")
     client.take_off()

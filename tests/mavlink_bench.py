@@ -247,6 +247,7 @@ class Flown:
     outcome: Outcome
     reason: str
     listener: Listener
+    notes: tuple[str, ...] = ()
 
     @property
     def told(self) -> str:
@@ -260,11 +261,16 @@ class Flown:
 
 
 async def flight(
-    made: Bench, given: str = "", act: Callable[[TickInputs, Tick], None] = lambda _inputs, _tick: None
+    made: Bench,
+    given: str = "",
+    act: Callable[[TickInputs, Tick], None] = lambda _inputs, _tick: None,
+    operator: Operator | None = None,
 ) -> Flown:
     """The short mission, flown as a session does; `act` may do something at each tick."""
+    operator = operator or Operator()
     setup, story, listener = short_mission.setup(), Story(), Listener(act)
     async with made.link(given) as link:
-        loop = FlightLoop(setup, CLOCK, link, made.pose, tuple, [story, listener])
-        direction = await _flown(loop, link, CLOCK, setup, FlightOptions(operator=Operator()), None)
-    return Flown(direction.outcome or story.outcome, direction.reason or story.reason, listener)
+        loop = FlightLoop(setup, CLOCK, link, made.pose, operator, [story, listener])
+        direction = await _flown(loop, link, CLOCK, setup, FlightOptions(operator=operator), None)
+    notes = tuple(loop.notes)
+    return Flown(direction.outcome or story.outcome, direction.reason or story.reason, listener, notes)

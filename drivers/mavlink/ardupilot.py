@@ -15,6 +15,8 @@ _MODES = {
     21: "SMART_RTL", 22: "FLOWHOLD", 23: "FOLLOW",
 }  # fmt: skip
 _GUIDED, _LAND, _GUIDED_NOGPS = 4, 9, 20
+_ALONE = frozenset({3, 6, 9, 17, 21})
+"""AUTO, RTL, LAND, BRAKE, SMART_RTL: what its failsafes enter."""
 _FLIGHT = {"guided": _GUIDED, "guided_nogps": _GUIDED_NOGPS}
 
 READY_FLAGS = 0x33F
@@ -70,6 +72,10 @@ class ArduPilot:
         if on_link_lost == "cut":
             raise cannot_cut(self.name)
         return _REQUIRED
+
+    def flies_alone_in(self, custom_mode: int) -> bool:
+        """As its failsafes choose."""
+        return custom_mode in _ALONE
 
     def mode_name(self, custom_mode: int) -> str:
         """By number (ArduCopter's mode.h)."""

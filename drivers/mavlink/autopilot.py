@@ -110,6 +110,10 @@ class Autopilot(Protocol):
         """Whether its estimate needs to be told where on earth it is."""
         ...
 
+    def flies_alone_in(self, custom_mode: int) -> bool:
+        """Whether a mode is one of those in which its failsafes fly, and not a pilot's sticks."""
+        ...
+
     def requirements(self, on_link_lost: LinkLossPolicy) -> tuple[Requirement, ...]:
         """Parameters without which it is not flown.
 

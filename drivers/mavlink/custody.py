@@ -21,6 +21,8 @@ class Custody:
         """airborne: whether motion capture sees it above the ground."""
         self.taken_over = ""
         """Who flies in our place, and in which mode; empty while nobody does."""
+        self.flown_by_pilot: bool | None = None
+        """Whether that is a person, and not the autopilot's own failsafe."""
         self.lost = False
         """Whether it was disarmed in the air, not by us."""
         self.ours = False
@@ -42,6 +44,8 @@ class Custody:
             self._outbox.confirm(armed=armed)
         elif not armed:
             self._note_disarmed(now_ns)
+        elif self.flown_by_pilot is False:
+            self._note_pilot(now_ns)
         elif not self._is_in_expected_mode():
             self._hand_over(now_ns)
 
@@ -85,9 +89,24 @@ class Custody:
         self._contact.picture.say(f"the vehicle was disarmed in the air, not by us{self._contact.said()}")
 
     def _hand_over(self, now_ns: int) -> None:
-        picture, autopilot = self._contact.picture, self._contact.autopilot
-        alone = picture.failsafe or self._outbox.falls_back(now_ns)
-        mode = "unknown" if picture.custom_mode is None else autopilot.mode_name(picture.custom_mode)
-        self.taken_over = f"{'the autopilot by itself' if alone else 'the pilot'} took over: mode {mode}"
-        self._outbox.hand_over(now_ns, to_pilot=not alone)
+        picture = self._contact.picture
+        failing = picture.failsafe or self._outbox.falls_back(now_ns)
+        self._taken_by(now_ns, pilot=not (failing and self._flies_alone()))
         picture.say(f"{self.taken_over}; its poses go on until it is disarmed{self._contact.said()}")
+
+    def _note_pilot(self, now_ns: int) -> None:
+        """After a failsafe the pilot may take over: from then on it is not stopped either."""
+        if not self._flies_alone() and self._contact.picture.custom_mode != self._contact.autopilot.flight_mode:
+            self._taken_by(now_ns, pilot=True)
+            self._contact.picture.say(self.taken_over)
+
+    def _taken_by(self, now_ns: int, *, pilot: bool) -> None:
+        picture, autopilot = self._contact.picture, self._contact.autopilot
+        mode = "unknown" if picture.custom_mode is None else autopilot.mode_name(picture.custom_mode)
+        self.flown_by_pilot = pilot
+        self.taken_over = f"{'the pilot' if pilot else 'the autopilot by itself'} took over: mode {mode}"
+        self._outbox.hand_over(now_ns, to_pilot=pilot)
+
+    def _flies_alone(self) -> bool:
+        mode = self._contact.picture.custom_mode
+        return mode is not None and self._contact.autopilot.flies_alone_in(mode)

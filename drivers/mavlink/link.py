@@ -32,7 +32,7 @@ STREAM_S = 1.2
 ARMING_S = 9.0
 """For all of arming; the flight itself gives up after 10 s."""
 POSES_S = 60.0
-"""So long poses go on, while the link closes, to a vehicle that lands by itself or that the pilot flies."""
+"""So long poses go on, while the link closes, to a vehicle that lands by itself."""
 HEARTBEAT_LOST_NS = 3_500_000_000
 """Three heartbeats at the slowest: who has the vehicle cannot be seen any more, whatever else is heard."""
 STOP_S = 1.0
@@ -127,12 +127,12 @@ class MavlinkLink:
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Leave a vehicle in the air to its own LAND mode, or to who took over; its poses go on until it is down."""
+        """Leave a vehicle in the air to its own LAND mode, and go on with its poses until it is down."""
         picture = self._contact.picture
         try:
             if self._outbox.latched:
                 await until(self._clock, lambda: picture.armed is False, STOP_S)
-            elif picture.armed and self._custody.ours:
+            elif picture.armed and self._custody.is_ours():
                 await self._leave()
         finally:
             await self._close()
@@ -237,6 +237,7 @@ class MavlinkLink:
             loss_share=session.losses.share(now_ns),
             fallback_active=falls_back,
             taken_over=self._custody.taken_over,
+            flown_by_pilot=self._custody.flown_by_pilot,
             transmitted=transmitted,
             telemetry=picture.telemetry(now_ns=now_ns, lost=self._custody.lost),
         )
@@ -343,14 +344,13 @@ class MavlinkLink:
     async def _leave(self) -> None:
         """Have a vehicle that is still armed land by itself, or disarm where it stands; its poses go on meanwhile."""
         picture = self._contact.picture
-        if not (self._outbox.over or self._airborne()):
+        if not self._airborne():
             with contextlib.suppress(RefusedError):
                 await self.disarm()
             return
-        if not self._outbox.over:
-            self._custody.landing = True
-            self._outbox.land(self._clock.now_ns())
-            await arming.land(self._controls, self._custody)
+        self._custody.landing = True
+        self._outbox.land(self._clock.now_ns())
+        await arming.land(self._controls, self._custody)
         await until(self._clock, lambda: picture.armed is False, POSES_S)
 
     async def _close(self) -> None:

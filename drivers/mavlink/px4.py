@@ -12,7 +12,8 @@ from lcd_flight.model import LinkLossPolicy
 
 _MAIN = {1: "MANUAL", 2: "ALTCTL", 3: "POSCTL", 4: "AUTO", 5: "ACRO", 6: "OFFBOARD", 7: "STABILIZED", 8: "RATTITUDE"}
 _AUTO = {1: "READY", 2: "TAKEOFF", 3: "LOITER", 4: "MISSION", 5: "RTL", 6: "LAND", 8: "FOLLOW", 9: "PRECLAND"}
-_OFFBOARD, _LAND = 6 << 16, 4 << 16 | 6 << 24
+_AUTO_MAIN = 4
+_OFFBOARD, _LAND = 6 << 16, _AUTO_MAIN << 16 | 6 << 24
 
 READY_FLAGS = 0x2F
 """Attitude, horizontal and vertical velocity, relative horizontal and absolute vertical position (ESTIMATOR_STATUS)."""
@@ -54,11 +55,15 @@ class Px4:
         value, does = (TERMINATES, "cuts its motors") if on_link_lost == "cut" else (LANDS, "lands")
         return (*_ALWAYS, is_value("COM_OBL_RC_ACT", value, f"it {does} when the stream has stopped"))
 
+    def flies_alone_in(self, custom_mode: int) -> bool:
+        """Any AUTO mode."""
+        return custom_mode >> 16 & 0xFF == _AUTO_MAIN
+
     def mode_name(self, custom_mode: int) -> str:
         """By main and sub mode (px4_custom_mode.h)."""
         main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
         name = _MAIN.get(main, f"{main}")
-        return f"{name}.{_AUTO.get(sub, sub)}" if main == 4 else name
+        return f"{name}.{_AUTO.get(sub, sub)}" if main == _AUTO_MAIN else name
 
     def mode_command(self, custom_mode: int) -> tuple[float, float, float]:
         """Custom mode enabled, main, sub."""

@@ -100,6 +100,8 @@ class FlightDisplay:
 
 def _entered(event: Flying) -> str:
     """What begins with a phase."""
+    if event.phase is Phase.HANDED_OVER:
+        return f"{event.time_s:.1f} s after take-off; its poses go on until it is disarmed, Ctrl-C ends them"
     if event.kind is None or event.phase in _ABNORMAL or event.phase is Phase.LANDED:
         return f"{event.time_s:.1f} s after take-off"
     what = {LegKind.TRANSFER: "to the start of the next item", LegKind.TRAJECTORY: f"{event.waypoints} waypoints"}

@@ -22,6 +22,8 @@ BY_HAND_S = 60.0
 """For each motion of the check by hand."""
 LINGER_S = 1.0
 """How long ticks go on after the end: for the log, and to repeat a stop."""
+HANDED_OVER_S = 60.0
+"""How long they go on, and poses with them, for somebody else who flies the vehicle; until it is disarmed at most."""
 
 Consent = Callable[[Operator], Awaitable[bool]]
 """Asks whether to arm."""
@@ -66,9 +68,13 @@ class Director:
             with self._operator.keys():
                 await self._take_off()
                 await self._loop.until(lambda _, decided: decided.phase.over)
-                await self._loop.for_s(LINGER_S)
+                await self._see_off()
+                if self._loop.memory.phase is not Phase.HANDED_OVER:
+                    await self._loop.for_s(LINGER_S)
                 await self._loop.motors_done()
         except RefusedError as error:
+            with self._operator.keys():
+                await self._see_off()
             return Direction(self._checks, Outcome.REFUSED, str(error))
         return Direction(self._checks)
 
@@ -155,6 +161,23 @@ class Director:
         self._loop.order(Command.TAKEOFF)
         await self._on_ground(lambda _, decided: decided.phase.airborne)
 
+    async def _see_off(self) -> None:
+        """Go on for somebody else who flies, whose position may hang on our poses; Ctrl-C or SIGTERM ends that."""
+        recent = self._loop.recent
+        if not recent or not _is_flown_by_others(recent[-1]):
+            return
+        began, phase, quits = recent[-1], self._loop.memory.phase, self._operator.quits
+        end_ns = began.now_ns + round(HANDED_OVER_S * 1e9)
+
+        def left(inputs: TickInputs, decided: Tick) -> bool:
+            ended = inputs.now_ns >= end_ns or self._operator.quits > quits
+            return ended or decided.phase is not phase or not _is_flown_by_others(inputs)
+
+        decided = await self._loop.until(left)
+        if decided.phase is phase and _is_flown_by_others(recent[-1]):
+            why = "interrupted" if self._operator.quits > quits else f"{HANDED_OVER_S:g} s are over"
+            self._loop.notes.append(f"{recent[-1].link.taken_over}; {why}: its poses stop, and it is still armed")
+
     async def _for_s(self, duration_s: float) -> None:
         first = await self._on_ground(lambda _inputs, _decided: True)
         end_ns = first.now_ns + round(duration_s * 1e9)
@@ -191,6 +214,11 @@ class Director:
 def _reports(inputs: TickInputs) -> bool:
     telemetry = inputs.link.telemetry
     return inputs.pose.state is not None and telemetry is not None and telemetry.battery_V is not None
+
+
+def _is_flown_by_others(inputs: TickInputs) -> bool:
+    telemetry = inputs.link.telemetry
+    return bool(inputs.link.taken_over) and telemetry is not None and bool(telemetry.armed)
 
 
 def _ended(decided: Tick) -> bool:

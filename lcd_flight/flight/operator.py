@@ -32,13 +32,16 @@ class Operator:
         """terminal: where keys come from, standard input by default; anything but a terminal has none."""
         self._terminal = terminal or sys.stdin
         self._pressed: list[Command] = []
-        self._interrupts = 0
+        self._interrupts = self._quits = 0
         self._keys = False
+        self.quits = 0
+        """Ctrl-C and SIGTERM so far, of which the commands have been read; what ends a wait ends by these."""
 
     def __call__(self) -> tuple[Command, ...]:
         """What has been asked for since the last call."""
         if self._keys:
             self._read_keys()
+        self.quits = self._quits  # first: a signal may come between the two
         commands = tuple(self._pressed)
         del self._pressed[: len(commands)]
         return commands
@@ -47,6 +50,7 @@ class Operator:
         """One more Ctrl-C."""
         self._pressed.append(INTERRUPTS[min(self._interrupts, len(INTERRUPTS) - 1)])
         self._interrupts += 1
+        self._quits += 1
 
     @contextlib.contextmanager
     def listening(self) -> Iterator[None]:
@@ -96,8 +100,9 @@ class Operator:
     def _on_interrupt(self, _number: int, _frame: FrameType | None) -> None:
         self.interrupt()
 
-    def _on_terminate(self, _number: int, _frame: FrameType | None) -> None:
+    def _on_terminate(self, number: int, _frame: FrameType | None) -> None:
         self._pressed.append(Command.LAND)
+        self._quits += number == signal.SIGTERM
 
     def _read_keys(self) -> None:
         while self._keys and self._readable():

@@ -38,6 +38,10 @@ class Event(IntEnum):
     KILL = 14
     CRASHED = 15
     """The vehicle says so itself, or it is seen on the ground."""
+    STOPPED_ALONE = 16
+    """The operator stops the motors of a vehicle that its own failsafe flies."""
+    CRASHED_ALONE = 17
+    """A vehicle that its own failsafe flies says that it has crashed."""
 
 
 OF_COMMAND: Mapping[Command, Event] = {
@@ -125,7 +129,7 @@ TABLE: Mapping[Phase, Mapping[Event, Phase]] = {
     Phase.LAND_NOW: {Event.EXPIRED: Phase.DESCEND_BLIND, **_GOING_DOWN},
     Phase.DESCEND_BLIND: {Event.EXPIRED: Phase.KILL, **_GOING_DOWN},
     Phase.LANDED: {Event.KILL: Phase.KILL, Event.CRASHED: Phase.CRASHED},
-    Phase.HANDED_OVER: {},
+    Phase.HANDED_OVER: {Event.STOPPED_ALONE: Phase.KILL, Event.CRASHED_ALONE: Phase.CRASHED},
     Phase.KILL: {},
     Phase.CRASHED: {},
 }

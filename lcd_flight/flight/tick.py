@@ -46,10 +46,14 @@ _OF_CODE = {
 }
 """Findings that lead to an event of their own, whatever their severity."""
 
+_OPERATOR_STOP = "operator_stop"
+_WHILE_ALONE = {_OPERATOR_STOP: Event.STOPPED_ALONE, VEHICLE_CRASHED: Event.CRASHED_ALONE}
+"""Findings that count also while the vehicle's own failsafe flies it."""
+
 _ORDERS = {
     Command.LAND: Finding("operator_land", Severity.LAND, "the operator asked to land"),
     Command.DESCEND: Finding("operator_descend", Severity.DESCEND, "the operator asked to descend level"),
-    Command.STOP_MOTORS: Finding("operator_stop", Severity.KILL, "the operator stopped the motors"),
+    Command.STOP_MOTORS: Finding(_OPERATOR_STOP, Severity.KILL, "the operator stopped the motors"),
 }
 
 
@@ -125,7 +129,11 @@ def _scope(phase: Phase) -> Scope:
 
 
 def _orders(inputs: TickInputs) -> tuple[Finding, ...]:
-    return tuple(_ORDERS[command] for command in inputs.commands if command in _ORDERS)
+    """What the operator asks for; to a pilot who flies nothing is sent, and the operator is told why."""
+    asked = tuple(_ORDERS[command] for command in inputs.commands if command in _ORDERS)
+    if not inputs.link.flown_by_pilot:
+        return asked
+    return tuple(Finding(f.code, Severity.WARN, f"not sent ({inputs.link.taken_over}): {f.message}") for f in asked)
 
 
 def _expiry(inputs: TickInputs, memory: Memory) -> tuple[Finding, ...]:
@@ -153,6 +161,8 @@ def _events(inputs: TickInputs, findings: tuple[Finding, ...]) -> list[Event]:
             events.append(_OF_CODE[finding.code])
         elif finding.severity in OF_SEVERITY:
             events.append(OF_SEVERITY[finding.severity])
+        if inputs.link.flown_by_pilot is False and finding.code in _WHILE_ALONE:
+            events.append(_WHILE_ALONE[finding.code])
     return events
 
 

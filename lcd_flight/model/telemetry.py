@@ -63,6 +63,8 @@ class LinkReport:
     """Share of radio packets that were acknowledged without being repeated, where there is a radio."""
     taken_over: str = ""
     """Who flies in our place, e.g. `the pilot took over: mode POSCTL`; for good. Empty while nobody does."""
+    flown_by_pilot: bool | None = None
+    """Whether who took over is a person, and not the vehicle's own failsafe; None while nobody did."""
     transmitted: tuple[Transmission, ...] = ()
     """Setpoints that went out since the last report, byte for byte, where the link can tell."""
     telemetry: Telemetry | None = None

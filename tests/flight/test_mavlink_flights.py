@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from mavlink_bench import CLOCK, Bench, Flown, bench, flight, kind_of, run
 
-from drivers.mavlink import link
+from lcd_flight.flight import director
 from lcd_flight.model import Outcome, Phase, Tick, TickInputs
 
 FLAVOURS = ["px4", "ardupilot"]
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.usefixtures("own_state")
 def own_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Signing timestamps are kept here, not among the user's own; who took over gets poses for a moment only."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    monkeypatch.setattr(link, "POSES_S", 8.0)
+    monkeypatch.setattr(director, "HANDED_OVER_S", 8.0)
 
 
 SETPOINT, ODOMETRY = 82, 331
@@ -266,7 +266,7 @@ def test_poses_go_on_to_the_pilot_who_flies_until_the_vehicle_is_disarmed() -> N
         assert not made.armed
         assert made.height_m < 0.02
         assert take.at_ns is not None
-        over_ns = done.listener.flight[-1][0].now_ns
+        over_ns = next(i.now_ns for i, t in done.listener.flight if t.phase is Phase.HANDED_OVER)
         assert len(made.air.sent(ODOMETRY, over_ns)) > 50
         assert made.air.sent(SETPOINT, over_ns) == []
 

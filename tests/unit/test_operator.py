@@ -54,6 +54,16 @@ def test_a_terminated_process_and_a_lost_terminal_land(number: signal.Signals) -
     assert operator() == (Command.LAND, Command.LAND)
 
 
+def test_what_ends_a_wait_is_an_interrupt_or_a_termination_whose_command_was_read() -> None:
+    operator, found = Operator(io.StringIO()), []
+    with operator.listening():
+        for number in (signal.SIGHUP, signal.SIGTERM, signal.SIGINT):
+            signal.raise_signal(number)
+            found.append(operator.quits)
+            operator()
+    assert [*found, operator.quits] == [0, 0, 1, 2]
+
+
 def test_the_handlers_before_are_put_back_also_after_an_error() -> None:
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     before = [signal.getsignal(number) for number in numbers]

@@ -32,6 +32,7 @@ SEVERITY = {
     Phase.CRASHED: 5,
 }
 FAULTS = (Event.BRAKE, Event.LAND, Event.DESCEND, Event.TAKEN_OVER, Event.KILL, Event.CRASHED)
+ALONE = (Event.STOPPED_ALONE, Event.CRASHED_ALONE)
 
 # Every transition there is, written out once more; every other pair must leave the phase as it is.
 EXPECTED = """
@@ -56,7 +57,7 @@ land_now:      TOUCHDOWN landed, EXPIRED descend_blind, DESCEND descend_blind, T
                KILL kill, CRASHED crashed
 descend_blind: TOUCHDOWN landed, EXPIRED kill, DESCEND descend_blind, TAKEN_OVER handed_over, KILL kill, CRASHED crashed
 landed:        KILL kill, CRASHED crashed
-handed_over:
+handed_over:   STOPPED_ALONE kill, CRASHED_ALONE crashed
 kill:
 crashed:
 """
@@ -99,10 +100,19 @@ def test_severity_only_rises_except_by_resume(phase: Phase, event: Event) -> Non
 
 
 @pytest.mark.parametrize("event", Event)
-def test_kill_crash_and_hand_over_are_latched(event: Event) -> None:
-    assert after(Phase.HANDED_OVER, event) is Phase.HANDED_OVER
+def test_kill_and_crash_are_latched(event: Event) -> None:
     assert after(Phase.KILL, event) is Phase.KILL
     assert after(Phase.CRASHED, event) is Phase.CRASHED
+
+
+@pytest.mark.parametrize("event", [e for e in Event if e not in ALONE])
+def test_a_hand_over_is_latched_while_it_is_not_left_alone(event: Event) -> None:
+    assert after(Phase.HANDED_OVER, event) is Phase.HANDED_OVER
+
+
+@pytest.mark.parametrize(("phase", "event"), [(p, e) for p, e in product(Phase, ALONE) if p is not Phase.HANDED_OVER])
+def test_what_counts_for_a_vehicle_alone_counts_after_a_hand_over_only(phase: Phase, event: Event) -> None:
+    assert after(phase, event) is phase
 
 
 @pytest.mark.parametrize("phase", [p for p in Phase if p not in (Phase.KILL, Phase.CRASHED, Phase.HANDED_OVER)])
@@ -150,8 +160,8 @@ def test_the_gravest_event_of_a_tick_wins_whatever_the_order() -> None:
 
 
 def test_faults_are_ordered_by_severity_and_come_last() -> None:
-    assert sorted(FAULTS) == list(FAULTS)
-    assert min(FAULTS) > max(set(Event) - set(FAULTS))
+    assert sorted((*FAULTS, *ALONE)) == [*FAULTS, *ALONE]
+    assert min(FAULTS) > max(set(Event) - {*FAULTS, *ALONE})
 
 
 def test_every_command_severity_and_leg_leads_somewhere() -> None:

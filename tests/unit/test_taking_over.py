@@ -7,11 +7,25 @@ from pathlib import Path
 import msgspec
 import pytest
 import synthetic_flight
-from flight_bench import LIMITS, TAKEOFF_TICK, Flight, codes, first, fly, healthy, phases, plan, setup, with_link
+from flight_bench import (
+    LIMITS,
+    TAKEOFF_TICK,
+    Fault,
+    Flight,
+    codes,
+    first,
+    fly,
+    healthy,
+    phases,
+    plan,
+    setup,
+    with_link,
+    with_telemetry,
+)
 
 from lcd_flight.flight.replay import compare
 from lcd_flight.flight.result import Story
-from lcd_flight.model import MotorRequest, Outcome, Phase, State, TickInputs
+from lcd_flight.model import Command, MotorRequest, Outcome, Phase, Severity, State, TickInputs
 from lcd_flight.model.frames import IDENTITY
 from lcd_flight.record import LogWriter, read_log
 from lcd_flight.review.figures import figures_of
@@ -89,7 +103,63 @@ def test_a_log_from_before_reads_as_nobody() -> None:
     state = State((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), IDENTITY, (0.0, 0.0, 0.0))
     inputs = healthy(0, state, 0)
     record = msgspec.json.decode(json_records.encode(inputs))
-    del record["link"]["taken_over"]
+    del record["link"]["taken_over"], record["link"]["flown_by_pilot"]
     assert json_records.decode(msgspec.json.encode(record), TickInputs) == inputs
     with pytest.raises(msgspec.ValidationError):
         json_records.decode(b'{"link": {"taken_over": 1}}', TickInputs)
+
+
+def handed_over(pilot: bool | None, crash: bool = False) -> Fault:
+    """Somebody takes over; a second later, maybe, the vehicle says that it has crashed."""
+
+    def fault(after: int, inputs: TickInputs) -> TickInputs:
+        if after < AFTER:
+            return inputs
+        inputs = with_link(inputs, taken_over=WHO, flown_by_pilot=pilot)
+        return with_telemetry(inputs, crashed=True) if crash and after >= AFTER + 100 else inputs
+
+    return fault
+
+
+STOPPED = {AFTER + 50: (Command.STOP_MOTORS,)}
+
+
+def test_the_operator_stops_what_flies_by_itself_for_as_long_as_it_takes() -> None:
+    flight = fly(fault=handed_over(pilot=False), orders=STOPPED, linger=100)
+    assert phases(flight)[-2:] == [Phase.HANDED_OVER, Phase.KILL]
+    stops = [decided.motors for _, decided in flight if decided.phase is Phase.KILL]
+    assert len(stops) > 40
+    assert set(stops) == {MotorRequest.STOP}
+    assert story_of(flight).outcome is Outcome.CUT
+    assert compare(flight, setup()).equal
+
+
+def test_he_does_so_also_in_the_tick_that_sees_it() -> None:
+    flight = fly(fault=handed_over(pilot=False), orders={AFTER: (Command.STOP_MOTORS,)})
+    assert phases(flight)[-1] is Phase.KILL
+
+
+@pytest.mark.parametrize("at", [AFTER, AFTER + 50])
+def test_what_a_pilot_flies_is_not_stopped_and_the_screen_says_why(at: int) -> None:
+    flight = fly(fault=handed_over(pilot=True), orders={at: (Command.STOP_MOTORS,)}, linger=100)
+    assert phases(flight)[-1] is Phase.HANDED_OVER
+    assert MotorRequest.STOP not in {decided.motors for _, decided in flight}
+    told = [finding for _, decided in flight for finding in decided.findings if finding.code == "operator_stop"]
+    assert [(f.severity, f.message) for f in told] == [
+        (Severity.WARN, f"not sent ({WHO}): the operator stopped the motors")
+    ]
+
+
+@pytest.mark.parametrize(("pilot", "last"), [(False, Phase.CRASHED), (True, Phase.HANDED_OVER)])
+def test_a_crash_counts_where_nobody_else_flies(pilot: bool, last: Phase) -> None:
+    flight = fly(fault=handed_over(pilot, crash=True), linger=200)
+    assert phases(flight)[-1] is last
+    assert MotorRequest.STOP not in {decided.motors for _, decided in flight}
+
+
+def test_what_a_log_from_before_tells_is_decided_as_then() -> None:
+    """It does not say who flew: whatever was ordered, the hand-over stood, with the findings of that time."""
+    flight = fly(fault=handed_over(pilot=None, crash=True), orders=STOPPED, linger=200)
+    assert phases(flight)[-1] is Phase.HANDED_OVER
+    (stop,) = [f for _, decided in flight for f in decided.findings if f.code == "operator_stop"]
+    assert (stop.severity, stop.message) == (Severity.KILL, "the operator stopped the motors")

@@ -16,6 +16,8 @@ RESTART_AFTER = 3
 """Old numbers that follow each other: not late packets but a sender that counts from the beginning."""
 AVERAGED = 64
 """Packets over which the sender's period is averaged."""
+SHORTEST_PERIOD_NS = 500_000.0
+"""No sender is faster; the first packets may come all at once, and would make its period nothing."""
 SILENCE_NS = 1_000_000_000
 """After so long a gap is not loss but absence, which is judged by its age."""
 _SECOND_NS = 1_000_000_000
@@ -64,7 +66,7 @@ class LossCounter:
 
     def _had_time_for(self, packets: int, late_ns: int) -> bool:
         """Whether the sender may have sent so many since the newest that came, at up to twice its average rate."""
-        return 2 * late_ns >= packets * self._period_ns
+        return 2 * late_ns >= packets * max(self._period_ns, SHORTEST_PERIOD_NS)
 
     def _take_new(self, number: int, ahead: int, now_ns: int, late_ns: int) -> bool:
         """A number further on than any before."""

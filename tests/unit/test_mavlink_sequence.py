@@ -115,3 +115,11 @@ def test_memory_is_bounded() -> None:
     counter = taken([n * 7 for n in range(20_000)], period_ns=MS)
     counter.share(20_000 * MS)
     assert len(counter._last_second) <= 1_001
+
+
+def test_copies_and_late_packets_in_a_first_burst_are_no_loss() -> None:
+    """What waited in a buffer comes all at once: the sender's period cannot be told from that."""
+    counter = LossCounter()
+    for number in (0, 1, 1, 3, 2, 4, 4, 5):
+        counter.take(number, 1_000_000)
+    assert (counter.lost, counter.duplicates, counter.late) == (0, 2, 1)

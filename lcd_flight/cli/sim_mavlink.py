@@ -13,7 +13,7 @@ from lcd_flight.errors import Outcome
 if TYPE_CHECKING:
     from lcd_flight.cli.sim_server import Bench
 
-VEHICLE = "hummingbird"
+VEHICLE = "x500"
 
 
 def mavlink(

@@ -48,7 +48,7 @@ class MavlinkServer:
         key = key_of(options.key_file)
         self._bench = Bench(options, context, key, time.time_ns() - context.clock.now_ns())
         self._port: Port = TcpPort(host, port, self._receive) if kind == "tcp" else UdpPort(host, port, self._receive)
-        self._name = f"{'PX4' if options.flavour == 'px4' else 'ArduCopter'} on a {context.vehicle.name}"
+        self._name = f"{'PX4' if options.flavour == 'px4' else 'ArduCopter'} on {context.vehicle.name}"
 
     @property
     def description(self) -> str:

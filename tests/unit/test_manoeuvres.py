@@ -124,7 +124,7 @@ def fall_time_s(vehicle: Vehicle, height_m: float, climb: float) -> float:
     return steps * step_s
 
 
-@pytest.mark.parametrize("name", ["crazyflie", "crazyflie-2.1", "hummingbird"])
+@pytest.mark.parametrize("name", ["crazyflie", "crazyflie-2.1", "hummingbird", "x500"])
 @pytest.mark.parametrize(("height_m", "climb"), [(0.3, 0.0), (1.0, 0.0), (2.0, 1.5), (8.0, 0.0), (30.0, 2.0)])
 def test_the_blind_time_covers_the_descent_and_little_more(name: str, height_m: float, climb: float) -> None:
     vehicle = load_vehicle(name)

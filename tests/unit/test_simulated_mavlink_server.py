@@ -191,8 +191,8 @@ class TestCommand:
     @pytest.mark.parametrize(
         ("flavour", "vehicle", "events"),
         [
-            ("px4", "PX4 on a hummingbird, system 1", ["disarmed, loiter"]),
-            ("ardupilot", "ArduCopter on a hummingbird, system 1", ["disarmed, stabilize"]),
+            ("px4", "PX4 on x500, system 1", ["disarmed, loiter"]),
+            ("ardupilot", "ArduCopter on x500, system 1", ["disarmed, stabilize"]),
         ],
     )
     def test_it_serves_for_as_long_as_it_is_told(

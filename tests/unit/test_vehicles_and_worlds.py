@@ -28,7 +28,7 @@ def written(folder: Path, change: dict[str, Any], *, without: str = "") -> Path:
 
 
 def test_the_vehicles_that_ship() -> None:
-    assert vehicle_names() == ["crazyflie", "crazyflie-2.1", "hummingbird"]
+    assert vehicle_names() == ["crazyflie", "crazyflie-2.1", "hummingbird", "x500"]
     for name in vehicle_names():
         assert load_vehicle(name).name == name
 
@@ -51,6 +51,40 @@ def test_the_crazyflie_of_today_hovers_where_its_firmware_does() -> None:
     assert v.onboard is not None
     assert v.weight_N / v.max_thrust_N * 65535 == pytest.approx(38842, abs=2)
     assert v.onboard.thrust_limit * v.thrust_to_weight == pytest.approx(1.54, abs=0.005)
+
+
+def test_the_x500_is_that_of_the_gazebo_model() -> None:
+    """Hovers at 770 of 1000 rad/s; mass and moments of inertia are put together from its links."""
+    v = load_vehicle("x500")
+    body_kg, rotor_kg, height_m, arm_m = 2.0, 0.016076923076923075, 0.06, 0.174
+    mass_kg = body_kg + 4.0 * rotor_kg
+    centre_m = 4.0 * rotor_kg * height_m / mass_kg
+    across, around = 0.5 * (3.8464910e-7 + 2.6115852e-5), 2.6498582e-5
+    tilting = across + rotor_kg * (arm_m**2 + (height_m - centre_m) ** 2)
+    roll = 0.02166666666666667 + body_kg * centre_m**2 + 4.0 * tilting
+    yaw = 0.04 + 4.0 * (around + 2.0 * rotor_kg * arm_m**2)
+    assert v.mass_kg == pytest.approx(mass_kg, rel=1e-6)
+    assert v.inertia_kg_m2 == pytest.approx((roll, roll, yaw), rel=1e-4)
+    assert v.k_m == pytest.approx(0.016 * v.k_eta)
+    assert v.hover_rotor_speed == pytest.approx(769.56, abs=0.01)
+
+
+def test_the_x500s_onboard_gains_are_px4s() -> None:
+    """Outputs become counts by the slope of thrust at hover: decision record 0119. The yaw rate has twice the P."""
+    v = load_vehicle("x500")
+    assert v.onboard is not None
+    slope = 2.0 * v.k_eta * v.hover_rotor_speed * 850.0 / (v.k_eta * v.rotor_speed_max**2)
+    tilt, heading = math.sqrt(0.5) * 2.0 * 65535.0 * slope, 65535.0 * slope
+    assert [axis.kp for axis in v.onboard.attitude] == [6.5, 6.5, 2.8]
+    for axis, scale, (p, i, d) in zip(
+        v.onboard.rates,
+        (tilt, tilt, heading),
+        ((0.15, 0.2, 0.003), (0.15, 0.2, 0.003), (2.0 * 0.2, 0.1, 0.0)),
+        strict=True,
+    ):
+        wanted = [math.radians(scale * gain) for gain in (p, i, d)]
+        assert [axis.kp, axis.ki, axis.kd] == pytest.approx(wanted, rel=1e-3)
+        assert axis.integral_limit == pytest.approx(math.degrees(0.3 / i), rel=1e-3)
 
 
 def test_every_figure_that_ships_is_cited() -> None:

@@ -36,6 +36,15 @@ def test_the_shipped_model_plans_them_and_they_pass_the_rehearsal(path: Path) ->
     assert rehearsal.max_error_m < 0.75
 
 
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_the_benches_of_the_autopilots_fly_a_vehicle_of_their_size_and_pass_the_rehearsal(autopilot: str) -> None:
+    flight = api.plan(MISSIONS / f"bench_{autopilot}.yaml")
+    assert flight.vehicle.name == "x500"
+    rehearsal = api.rehearse(flight)
+    assert rehearsal.passed, rehearsal.text
+    assert rehearsal.max_error_m < 0.05
+
+
 def test_minimum_snap_saturates_on_the_saturating_task_and_is_refused(tmp_path: Path) -> None:
     text = SATURATING.read_text().replace("type: learned-polished", "type: minimum-snap")
     mission = tmp_path / "minimum_snap.yaml"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers.mavlink.autopilot import Autopilot
@@ -49,7 +50,8 @@ async def enter_mode(controls: Controls, custody: Custody, mode: int) -> None:
     picture, clock, name = controls.picture, controls.clock, controls.autopilot.mode_name(mode)
     deadline_ns, result = clock.now_ns() + round(LIMIT_S * 1e9), ACCEPTED
     while clock.now_ns() < deadline_ns and custody.is_ours():
-        result = await controls.commands.ask(_SET_MODE, *controls.autopilot.mode_command(mode))
+        wanted = _while_unchanged(picture, custody)
+        result = await controls.commands.ask(_SET_MODE, *controls.autopilot.mode_command(mode), wanted=wanted)
         if result == ACCEPTED and await until(clock, lambda: picture.custom_mode == mode, CONFIRM_S):
             return
         if picture.custom_mode == mode:  # the acknowledgement was lost, the change was not
@@ -57,6 +59,8 @@ async def enter_mode(controls: Controls, custody: Custody, mode: int) -> None:
         if result in (ACCEPTED, NO_ANSWER):
             break
         await pause(clock, RETRY_S)
+    if not custody.is_ours():
+        raise RefusedError(f"{name} is not asked for any more: {custody.taken_over or 'it was stopped or disarmed'}")
     if result == ACCEPTED:
         now = "none" if picture.custom_mode is None else controls.autopilot.mode_name(picture.custom_mode)
         raise RefusedError(f"the autopilot took the change to {name} but stays in {now}: is a remote control on?")
@@ -73,7 +77,8 @@ async def arm(controls: Controls) -> None:
     deadline_ns, result = clock.now_ns() + round(LIMIT_S * 1e9), ACCEPTED
     while clock.now_ns() < deadline_ns:
         _require_mode(controls)
-        result = await controls.commands.ask(_ARM, 1.0)
+        result = await controls.commands.ask(_ARM, 1.0, wanted=lambda: not picture.armed and _has_mode(controls))
+        _require_mode(controls)
         if (result == ACCEPTED or picture.armed) and await until(clock, lambda: picture.armed is True, CONFIRM_S):
             return
         if result in (ACCEPTED, NO_ANSWER):
@@ -100,7 +105,7 @@ async def disarm(controls: Controls, custody: Custody) -> None:
     result = NO_ANSWER
     for may, forced in ((custody.is_ours, 0.0), (custody.may_be_cut, FORCED)):
         if may():
-            result = await controls.commands.ask(_ARM, 0.0, forced)
+            result = await controls.commands.ask(_ARM, 0.0, forced, wanted=_while_armed(picture, may))
             if await until(clock, lambda: picture.armed is False, CONFIRM_S):
                 return
     if custody.is_ours():
@@ -126,6 +131,16 @@ def cut(controls: Controls) -> None:
     controls.commands.tell(_ARM, 0.0, FORCED)
 
 
+def _while_unchanged(picture: Picture, custody: Custody) -> Callable[[], bool]:
+    """True while the mode is the one of now, and the vehicle ours."""
+    before = picture.custom_mode
+    return lambda: picture.custom_mode == before and custody.is_ours()
+
+
+def _has_mode(controls: Controls) -> bool:
+    return controls.picture.custom_mode == controls.autopilot.flight_mode
+
+
 def _require_mode(controls: Controls) -> None:
     """Refuse to arm in a mode that somebody else has chosen meanwhile.
 
@@ -133,8 +148,12 @@ def _require_mode(controls: Controls) -> None:
         RefusedError: so it is.
     """
     mode, autopilot = controls.picture.custom_mode, controls.autopilot
-    if mode is not None and mode != autopilot.flight_mode:
+    if mode is not None and not _has_mode(controls):
         raise RefusedError(f"the mode was changed to {autopilot.mode_name(mode)} while arming: somebody else has it")
+
+
+def _while_armed(picture: Picture, may: Callable[[], bool]) -> Callable[[], bool]:
+    return lambda: picture.armed is True and may()
 
 
 async def _lands(controls: Controls, custody: Custody) -> bool:

@@ -6,7 +6,7 @@ what it asks for has happened: that is seen in the heartbeat.
 
 from __future__ import annotations
 
-import functools
+from collections.abc import Callable
 
 from drivers.mavlink.dialect import Message, mavlink
 from drivers.mavlink.session import Session
@@ -18,8 +18,11 @@ ANSWER_S = 0.4
 ATTEMPTS = 5
 PROGRESS_S = 5.0
 """More time for a command that is IN_PROGRESS, from each such word on."""
+PROGRESS_LIMIT_S = 10.0
+"""For all such words together."""
 
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
+IN_PROGRESS = mavlink.MAV_RESULT_IN_PROGRESS
 NO_ANSWER = -1
 
 
@@ -49,22 +52,21 @@ class Commands:
         target = (message.target_system, message.target_component)
         if target not in (self._ours, (0, 0)):  # older firmware leaves the target out
             return
-        if message.result == mavlink.MAV_RESULT_IN_PROGRESS:
+        self._answers[message.command] = int(message.result)
+        if message.result == IN_PROGRESS:
             self._progress_ns[message.command] = now_ns
-        else:
-            self._answers[message.command] = int(message.result)
 
-    async def ask(self, command: int, *parameters: float) -> int:
+    async def ask(self, command: int, *parameters: float, wanted: Callable[[], bool] = lambda: True) -> int:
         """Send a command until it is acknowledged; the result, `NO_ANSWER` where there is none.
 
-        parameters: the first of the seven; the rest is 0.
+        parameters: the first of the seven; the rest is 0. wanted: asked all the time before it is acknowledged; what
+        has happened without, or is no longer ours to ask for, is not sent again.
         """
         self._answers[command] = NO_ANSWER
-        self._progress_ns.pop(command, None)
         try:
             for confirmation in range(ATTEMPTS):
                 self.tell(command, *parameters, confirmation=confirmation)
-                if await until(self._clock, lambda: self._known(command), ANSWER_S):
+                if await until(self._clock, lambda: self._known(command) or not wanted(), ANSWER_S):
                     break
             await self._finished(command)
             return self._answers[command]
@@ -79,14 +81,13 @@ class Commands:
         )
 
     async def _finished(self, command: int) -> None:
-        """Wait for the result of a command that is IN_PROGRESS, as long as it says so."""
-        while command in self._progress_ns and self._answers[command] == NO_ANSWER:
-            heard_ns = self._progress_ns[command]
-            if not await until(self._clock, functools.partial(self._moved, command, heard_ns), PROGRESS_S):
-                return
+        """Wait for the result of a command that is IN_PROGRESS, as long as it says so, up to a limit."""
+        await until(self._clock, lambda: not self._progresses(command), PROGRESS_LIMIT_S)
 
     def _known(self, command: int) -> bool:
-        return self._answers.get(command, NO_ANSWER) != NO_ANSWER or command in self._progress_ns
+        return self._answers[command] != NO_ANSWER
 
-    def _moved(self, command: int, heard_ns: int) -> bool:
-        return self._answers[command] != NO_ANSWER or self._progress_ns[command] != heard_ns
+    def _progresses(self, command: int) -> bool:
+        if self._answers[command] != IN_PROGRESS:
+            return False
+        return self._clock.now_ns() - self._progress_ns[command] < PROGRESS_S * 1e9

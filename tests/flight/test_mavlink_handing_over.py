@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import signal
 from collections.abc import Callable
 
 import pytest
-from mavlink_bench import CLOCK, Bench, Flown, bench, flight, kind_of, run
+from mavlink_bench import CLOCK, Bench, Flown, bench, flight, kind_of, level, run, stream, wait_s
+from mavlink_specification import packet
 
 from drivers.mavlink.codec import Codec
 from lcd_flight.flight import director
 from lcd_flight.flight.operator import Operator
-from lcd_flight.model import Command, Outcome, Phase, Tick, TickInputs
+from lcd_flight.model import Command, Outcome, Phase, RefusedError, Tick, TickInputs
+from sim_bridge.mavlink.vocabulary import Result
 
 SETPOINT, ODOMETRY, COMMAND = 82, 331, 76
-ARM = 400
+ARM, SET_MODE = 400, 176
 PILOT = "the pilot took over: mode POSCTL"
 
 Acts = Callable[[Bench, Operator, float], None]
@@ -64,8 +67,7 @@ class Scene:
             self._acts(made, self.operator, (inputs.now_ns - self.over_ns) * 1e-9)
 
     def _look(self, made: Bench) -> None:
-        sent = b"".join(data for _, data in made.air.sent(COMMAND, self.over_ns))
-        self.commands = [m.param1 for m in Codec(1, 1).decode(bytearray(sent)) if m.command == ARM]
+        self.commands = orders(made, ARM, self.over_ns)
         self.poses_s = (made.air.sent(ODOMETRY)[-1][0] - self.over_ns) * 1e-9
         self.armed = made.armed
         assert CLOCK.now_ns() - made.air.sent(ODOMETRY)[-1][0] < 1.2e9  # nothing waits without poses
@@ -187,3 +189,81 @@ def test_a_pilot_who_takes_it_from_its_failsafe_has_it() -> None:
     assert "by itself" in done.reason
     assert PILOT in done.told
     assert done.notes == (f"{PILOT}; interrupted: its poses stop, and it is still armed",)
+
+
+def unacknowledged(*commands: int) -> Callable[[bytes, bool, int], list[bytes]]:
+    """Acknowledgements of some commands are lost."""
+
+    def tampers(data: bytes, up: bool, _now_ns: int) -> list[bytes]:
+        lost = not up and kind_of(data) == 77 and int.from_bytes(data[10:12], "little") in commands
+        return [] if lost else [data]
+
+    return tampers
+
+
+def orders(made: Bench, command: int, since_ns: int = 0) -> list[float]:
+    """First parameters of the commands of one kind."""
+    sent = b"".join(data for _, data in made.air.sent(COMMAND, since_ns))
+    return [m.param1 for m in Codec(1, 1).decode(bytearray(sent)) if m.command == command]
+
+
+def test_a_landing_whose_acknowledgement_is_lost_is_not_taken_from_the_pilot() -> None:
+    """He switches between two attempts."""
+
+    async def main() -> None:
+        async with bench(rc=True, tampers=unacknowledged(SET_MODE)) as made:
+            link = made.link()
+            await link.__aenter__()
+            await link.arm()
+            while made.height_m < 1.0:
+                await stream(link, level(1.15), 0.05)
+            leaving_ns, leaving = CLOCK.now_ns(), asyncio.create_task(link.__aexit__(None, None, None))
+            await wait_s(0.25)  # LAND has been seen in a heartbeat
+            switch(made, "posctl")
+            await wait_s(3.0)
+            assert len(orders(made, SET_MODE, leaving_ns)) == 1
+            assert made.mode == made.vehicle.firmware.pilot.modes["posctl"]
+            made.vehicle.firmware.pilot.disarm()
+            await leaving
+
+    run(main)
+
+
+def test_what_was_armed_and_disarmed_by_the_pilot_is_not_armed_again() -> None:
+    """The acknowledgement is lost; the heartbeat has shown it armed."""
+
+    async def main() -> None:
+        async with bench(rc=True, tampers=unacknowledged(ARM)) as made, made.link() as link:
+            arming = asyncio.create_task(link.arm())
+            while not made.armed:
+                await wait_s(0.004)
+            await wait_s(0.15)
+            made.vehicle.firmware.pilot.disarm("Disarmed by RC")
+            with pytest.raises(RefusedError):
+                await arming
+            assert orders(made, ARM) == [1.0]
+            assert not made.armed
+
+    run(main)
+
+
+def test_an_autopilot_that_is_in_progress_for_ever_does_not_keep_the_link_from_closing() -> None:
+    told = {"command": SET_MODE, "result": 5, "target_system": 245, "target_component": 191}
+
+    async def main() -> None:
+        async with bench(tampers=unacknowledged(SET_MODE)) as made:
+            link = made.link()
+            await link.__aenter__()
+            await link.arm()
+            await stream(link, level(0.4), 0.3)
+            pilot = made.vehicle.firmware.pilot
+            pilot.request_mode = lambda _mode: Result.ACCEPTED  # type: ignore[method-assign]
+            closing_ns, closing = CLOCK.now_ns(), asyncio.create_task(link.__aexit__(None, None, None))
+            while not closing.done() and CLOCK.now_ns() - closing_ns < 60e9:
+                await wait_s(0.2)
+                made.air.deliver(packet("COMMAND_ACK", told, 0, (1, 1)))
+            assert closing.done()
+            assert CLOCK.now_ns() - closing_ns < 20e9
+            assert not made.armed
+
+    run(main)

@@ -44,9 +44,11 @@ class Connection:
         contact = self.contact
         if self._context.listen_poses is None:
             raise RefusedError(f"{contact.uri} needs poses from motion capture to tell its vehicle, and there are none")
+        self._require_disarmed()
         requirements = contact.autopilot.requirements(self._context.on_link_lost)
         self.changed = await require(contact.parameters, requirements, may_set=contact.options.set_parameters)
         await contact.parameters.read([contact.autopilot.hover_parameter])
+        self._require_disarmed()  # reading may take seconds
         await self._place_origin()
         self._context.listen_poses(self._take_pose)
         self._streams = True
@@ -62,6 +64,15 @@ class Connection:
     def objection(self) -> str:
         """What speaks against the onboard estimate now; empty where nothing does."""
         return estimator.objection(self.contact.autopilot, self.contact.picture, self.pose, self._clock.now_ns())
+
+    def _require_disarmed(self) -> None:
+        """Nothing of a vehicle is changed, and no pose told, that somebody else may be flying.
+
+        Raises:
+            RefusedError: it is armed.
+        """
+        if self.contact.picture.armed:
+            raise RefusedError(f"the vehicle at {self.contact.uri} is armed, not by us: have it disarmed first")
 
     def _take_pose(self, raw: RawPose) -> None:
         """Pass a pose on, as it comes."""

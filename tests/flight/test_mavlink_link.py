@@ -26,7 +26,7 @@ def own_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
 
 
-SETPOINT, COMMAND, PARAM_SET, ORIGIN = 82, 76, 23, 48
+SETPOINT, COMMAND, PARAM_SET, ORIGIN, ODOMETRY = 82, 76, 23, 48, 331
 WRONG = {
     "px4": {
         "COM_OF_LOSS_T": (1.0, "COM_OF_LOSS_T is 1, set it to 0.5 (at most 0.5): s; so long it goes on"),
@@ -405,6 +405,23 @@ def test_a_pilot_who_takes_over_while_the_motors_come_up_has_it() -> None:
             assert len(commands(made, 400)) == count
             assert made.armed
             made.vehicle.firmware.pilot.disarm()
+
+    run(main)
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_nothing_is_changed_of_a_vehicle_that_is_armed_while_connecting(flavour: str) -> None:
+    """Neither its parameters, nor its origin, nor what its estimator fuses: somebody may be flying it."""
+
+    async def main() -> None:
+        async with bench(flavour, rc=True) as made:
+            made.vehicle.parameters.put("COM_OF_LOSS_T" if flavour == "px4" else "GUID_TIMEOUT", 1.0)
+            if flavour == "ardupilot":
+                made.vehicle.parameters.put("DISARM_DELAY", 0)
+            made.vehicle.firmware.pilot.request_arm(True, True)
+            text = await refusal(made, "set_parameters=true")
+            assert text.endswith("is armed, not by us: have it disarmed first")
+            assert [made.air.sent(kind) for kind in (PARAM_SET, ORIGIN, ODOMETRY)] == [[], [], []]
 
     run(main)
 

@@ -14,7 +14,8 @@ fly: $(VENV)/.flying ## set up and fly a mission in the simulator, in real time,
 	$(BIN)/lcd-fly missions/four_waypoints.yaml
 
 test: $(VENV)/.developing ## set up and pass the tests
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -m "not realtime" -n logical --maxprocesses 4 --dist loadfile
+	$(BIN)/python -m pytest -m realtime
 
 lint: $(VENV)/.developing ## style, types and import contracts
 	$(BIN)/ruff check .

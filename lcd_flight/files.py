@@ -25,7 +25,7 @@ def writing(path: Path) -> Iterator[Path]:
         yield partial
         partial.replace(path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another place") from error
+        raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another place, or make room") from error
     finally:
         with suppress(OSError):
             partial.unlink()

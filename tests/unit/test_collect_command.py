@@ -166,6 +166,6 @@ def test_a_full_disk_leaves_the_earlier_shards(tmp_path):
     )
     assert done.returncode == 2
     assert done.stderr.count("error: ") == 1
-    assert "shard-00000.parquet: cannot be written ([Errno 27] File too large); give another place" in done.stderr
+    assert "shard-00000.parquet: cannot be written (File too large); choose another place, or make room" in done.stderr
     assert (tmp_path / "shard-00000.parquet").read_bytes() == before
     assert not list(tmp_path.glob(".*"))

@@ -28,7 +28,7 @@ def rehearsed(speed: float, faults: list[str], runs: int = 40, seed: int = 3) ->
         "planner": {
             "type": "minimum-snap",
             "speed": speed,
-            "limits": {"max_velocity": 20, "max_thrust_ratio": 3, "max_tilt_deg": 180},
+            "limits": {"max_velocity": 20, "max_thrust_ratio": 3, "max_tilt_deg": 180, "max_body_rate_deg": 7200},
         },
         "plan": [
             {"takeoff": {"height": 1}},

@@ -6,11 +6,12 @@ chunk: chunks are taken apart here (https://mcap.dev/spec).
 
 from __future__ import annotations
 
+import os
 import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from io import BytesIO
-from typing import IO, TypeAlias
+from typing import IO, Any, TypeAlias
 
 import zstandard
 from mcap.data_stream import ReadDataStream
@@ -54,12 +55,29 @@ def unwatched(_: int) -> None:
     """For callers whom nobody watches."""
 
 
+class _Bounded:
+    """A file of which no more is read than there is: the library believes a damaged length and asks for exabytes."""
+
+    def __init__(self, stream: IO[bytes]) -> None:
+        self._stream = stream
+        here = stream.tell()
+        self._left = stream.seek(0, os.SEEK_END) - here
+        stream.seek(here)
+
+    def read(self, size: int) -> bytes:
+        """`size` bytes, or what is left."""
+        data = self._stream.read(min(size, self._left))
+        self._left -= len(data)
+        return data
+
+
 def records(stream: IO[bytes], advance: Advance = unwatched) -> Iterator[Record]:
     """Every record, those of chunks in the place of the chunk. The last is a `Footer`, or `Cut`.
 
     advance: told with each chunk.
     """
-    reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=_LARGEST_RECORD_BYTES)
+    bounded: Any = _Bounded(stream)  # all that the reader asks of a stream
+    reader = StreamReader(bounded, emit_chunks=True, validate_crcs=True, record_size_limit=_LARGEST_RECORD_BYTES)
     told = 0
     try:
         for record in reader.records:

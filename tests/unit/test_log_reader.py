@@ -10,6 +10,8 @@ import msgspec
 import numpy as np
 import pytest
 import synthetic_flight
+from mcap.records import Chunk
+from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 from synthetic_flight import Pair
 
@@ -105,6 +107,19 @@ def test_an_absurd_length_does_not_fill_the_memory(whole: Path, tmp_path: Path) 
     path = tmp_path / "absurd.mcap"
     path.write_bytes(whole.read_bytes()[:8] + struct.pack("<BQ", 1, 2**60))
     assert "was cut before the flight's description" in _refusal(path)
+
+
+@pytest.mark.parametrize("length", [2**40, 2**62, 2**64 - 1])
+def test_an_absurd_length_within_a_chunk_does_not_either(whole: Path, tmp_path: Path, length: int) -> None:
+    """Of its compressed data: what the library asks the file for before it looks at how large a record may be."""
+    data = bytearray(whole.read_bytes())
+    with whole.open("rb") as stream:
+        chunks = [each for each in StreamReader(stream, emit_chunks=True).records if isinstance(each, Chunk)]
+    struct.pack_into("<Q", data, data.index(chunks[len(chunks) // 2].data) - 8, length)
+    path = tmp_path / "absurd.mcap"
+    path.write_bytes(data)
+    assert 0 < len(read_ticks(path)) < len(read_ticks(whole))
+    assert not read_log(path).complete
 
 
 # Files that are none

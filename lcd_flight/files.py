@@ -25,7 +25,8 @@ def writing(path: Path) -> Iterator[Path]:
         yield partial
         partial.replace(path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another place, or make room") from error
+        why = error.strerror or error
+        raise InputError(f"{path}: cannot be written ({why}); choose another place, or make room") from error
     finally:
         with suppress(OSError):
             partial.unlink()
